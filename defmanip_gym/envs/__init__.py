@@ -1,0 +1,1 @@
+"""The transport task as Gymnasium environments over one batched engine."""

@@ -1,0 +1,91 @@
+"""Everything that defines a DeformTransport environment, validated in one place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.params import (
+    BeamParams,
+    DisturbanceParams,
+    RobotParams,
+    TaskParams,
+    validated_sigma,
+)
+from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.validation import require_choice
+
+ControlMode = Literal["task", "force"]
+ConstraintMode = Literal["terminate", "penalty", "cost"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransportConfig:
+    """Arguments of the environment; see its documentation.
+
+    ``robot`` and ``beam`` are true, ``nominal_robot`` and ``nominal_beam`` what the built-in
+    feedback linearization believes. By default it believes the truth, except that it counts on no
+    damping at the root: overestimated damping destabilizes the swing.
+    """
+
+    control_mode: ControlMode = "task"
+    constraint_mode: ConstraintMode = "terminate"
+    sigma_rad: float = math.pi / 6
+    robot: RobotParams = field(default_factory=RobotParams)
+    beam: BeamParams = field(default_factory=BeamParams)
+    nominal_robot: RobotParams | None = None
+    nominal_beam: BeamParams | None = None
+    task: TaskParams = field(default_factory=TaskParams)
+    disturbance: DisturbanceParams = field(default_factory=DisturbanceParams)
+
+    def __post_init__(self) -> None:
+        require_choice("control_mode", self.control_mode, get_args(ControlMode))
+        require_choice("constraint_mode", self.constraint_mode, get_args(ConstraintMode))
+        validated_sigma(self.sigma_rad)
+        nominal = self.nominal_beam
+        if nominal is not None and nominal.segment_count != self.beam.segment_count:
+            raise ParameterError(
+                "nominal_beam.segment_count",
+                nominal.segment_count,
+                f"{self.beam.segment_count}, the true beam's",
+                "The controller observes one angle per true segment.",
+            )
+
+    @property
+    def believed_robot(self) -> RobotParams:
+        """Robot parameters of the feedback linearization."""
+        return self.nominal_robot or self.robot
+
+    @property
+    def believed_beam(self) -> BeamParams:
+        """Beam parameters of the feedback linearization."""
+        if self.nominal_beam is not None:
+            return self.nominal_beam
+        beam = self.beam
+        return BeamParams(
+            mass_kg=beam.mass_kg,
+            length_m=beam.length_m,
+            damping=0.0,
+            segment_count=beam.segment_count,
+            joint_stiffness=beam.joint_stiffness,
+            joint_damping=beam.joint_damping,
+            radius_m=beam.radius_m,
+        )
+
+    @property
+    def goal_reach_and_height_m(self) -> tuple[float, float]:
+        """(ρ, z) of the grasp at the goal."""
+        pitch = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
+        reach, height = ArmKinematics(self.robot).reach_and_height(pitch).tolist()
+        return reach, height
+
+    @property
+    def goal_position_m(self) -> tuple[float, float, float]:
+        """Grasp position at the goal, world frame."""
+        x, y, heading = self.task.goal[:3]
+        reach, height = self.goal_reach_and_height_m
+        return x + reach * math.cos(heading), y + reach * math.sin(heading), height

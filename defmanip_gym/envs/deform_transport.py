@@ -1,0 +1,211 @@
+"""The single environment ``DeformTransport-v0``."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
+from defmanip_gym.envs.engine import TransportEngine
+from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
+from defmanip_gym.params import BeamParams, DisturbanceParams, RobotParams, TaskParams
+from defmanip_gym.validation import require_choice
+
+Array = NDArray[np.float64]
+
+
+class DeformTransportEnv(gymnasium.Env[Array, Array]):
+    """Carry a swinging or flexible beam to a goal without deforming it past σ.
+
+    ## Description
+    A nonholonomic mobile manipulator (a unicycle base with a two-joint arm) holds a beam by its
+    upper end. It must bring the grasp point to the goal, with the right heading, and come to rest
+    there, while the swing of every beam segment from the vertical stays within ±σ: the
+    simulation of H. G. Tanner, "Mobile Manipulation of Flexible Objects Under Deformation
+    Constraints", as a reinforcement learning task. Physics run in MuJoCo at 5 ms, control at 20 ms.
+    Vectors marked `_b` are in the base frame: forward along the heading, left, up.
+
+    ## Action Space
+    `control_mode="task"` (default): `Box(-1, 1, (3,), float64)`. The acceleration w of the grasp
+    point, Eq. (29), over `task.max_acceleration_m_s2` (3 m/s²). A built-in feedback linearization
+    with nominal parameters, Eq. (28), turns it into forces; a limiter keeps the grasp below
+    `task.max_speed_m_s` (2 m/s) and never hinders braking.
+
+    | Num | Action                          | Min | Max | Unit    |
+    | --- | ------------------------------- | --- | --- | ------- |
+    | 0   | forward acceleration of grasp   | -1  | 1   | 3 m/s²  |
+    | 1   | leftward acceleration of grasp  | -1  | 1   | 3 m/s²  |
+    | 2   | upward acceleration of grasp    | -1  | 1   | 3 m/s²  |
+
+    `control_mode="force"`: `Box(-1, 1, (4,), float64)`, the generalized forces T_r of Eq. (2) over
+    the actuator limits in `robot`.
+
+    | Num | Action                       | Min | Max | Unit    |
+    | --- | ---------------------------- | --- | --- | ------- |
+    | 0   | drive force f_b              | -1  | 1   | 400 N   |
+    | 1   | steering torque α_b          | -1  | 1   | 120 N·m |
+    | 2   | shoulder torque τ1           | -1  | 1   | 250 N·m |
+    | 3   | elbow torque τ2              | -1  | 1   | 150 N·m |
+
+    ## Observation Space
+    `Box(-inf, inf, (17 + 2 N,), float64)` for a beam of N segments; shown for N = 1.
+
+    | Num   | Name             | Observation                            | Unit       |
+    | ----- | ---------------- | -------------------------------------- | ---------- |
+    | 0-2   | goal_offset_b    | goal minus grasp position              | m          |
+    | 3-4   | heading          | sine and cosine of θ − θ_goal          | -          |
+    | 5-7   | grasp_velocity_b | velocity of the grasp                  | m/s        |
+    | 8-9   | base_velocity    | u1, u2                                 | m/s, rad/s |
+    | 10-11 | joints           | q1, q2                                 | rad        |
+    | 12-13 | joint_rates      | q̇1, q̇2                                 | rad/s      |
+    | 14    | swing            | φ of each segment, from the vertical   | rad        |
+    | 15    | swing_rate       | φ̇ of each segment                      | rad/s      |
+    | 16-18 | grasp_force_b    | measured force on the object           | N          |
+
+    ## Rewards
+    The sum of the terms below, each also in `info`. d is the distance of the grasp to the goal and
+    e the Euclidean norm of the four success errors, each over its tolerance.
+
+    | Term               | Value (weights in `task.reward`)                                       |
+    | ------------------ | ---------------------------------------------------------------------- |
+    | reward_distance    | decrease of d, 1 per metre                                             |
+    | reward_closeness   | decrease of log(1 + e)                                                 |
+    | reward_time        | -0.01 a step                                                           |
+    | reward_effort      | -0.001 times the squared norm of the action                            |
+    | reward_success     | +10 on success                                                         |
+    | reward_failure     | -10 on leaving the workspace, on failed physics, and in                |
+    |                    | `constraint_mode="terminate"` on exceeding σ                           |
+    | reward_deformation | in `constraint_mode="penalty"`: -(‖z2‖∞/σ - 1) while σ is exceeded     |
+
+    Every step's `info` also holds `is_success` and, in every mode, `cost` (1.0 while ‖z2‖∞ > σ,
+    else 0.0), `constraint_margin` (σ − ‖z2‖∞, rad), `cost_speed` (grasp speed beyond the limit,
+    m/s), `left_workspace`, `simulation_failed` and `distance_to_goal` (m).
+
+    ## Starting State
+    At rest, uniformly within ±(1.5 m, 1.5 m, 0.5 rad, 0.1 rad, 0.1 rad, 0.05 rad) of the paper's
+    (x, y, θ, q1, q2, φ) = (-8.5, 5.5, 0, π/3, -π/2, 0). `reset(options={"start": "paper"})` starts
+    right there, and `{"start": (x, y, θ, q1, q2, φ)}` anywhere in the workspace.
+
+    ## Episode End
+    Termination: success (grasp within 5 cm of the goal, slower than 5 cm/s, |φ| < 0.05 rad, heading
+    within 0.2 rad), leaving the workspace (more than 20 m from the goal, elbow straight or folded,
+    grasp too close to the shoulder axis or the floor), failed physics, and in
+    `constraint_mode="terminate"` ‖z2‖∞ > σ. Truncation: 1,000 steps (20 s) by `gymnasium.make`.
+
+    ## Arguments
+    | Argument        | Default          | Meaning                                                |
+    | --------------- | ---------------- | ------------------------------------------------------ |
+    | render_mode     | `None`           | `"human"`, `"rgb_array"` or `"depth_array"`            |
+    | control_mode    | `"task"`         | `"task"` or `"force"`                                  |
+    | constraint_mode | `"terminate"`    | `"terminate"`, `"penalty"` or `"cost"`                 |
+    | sigma_rad       | π/6              | σ, admissible swing, between 0 and π/3                 |
+    | robot           | `RobotParams()`  | true robot                                             |
+    | beam            | `BeamParams()`   | true beam                                              |
+    | nominal_robot   | `None`           | robot of the feedback linearization; the true one      |
+    | nominal_beam    | `None`           | its beam; the true one with no damping at the root     |
+    | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
+    | disturbance     | none             | force sinusoid, force bias, sensor noise               |
+
+    ## Version History
+    * v0: initial version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
+
+    def __init__(
+        self,
+        *,
+        render_mode: str | None = None,
+        control_mode: ControlMode = "task",
+        constraint_mode: ConstraintMode = "terminate",
+        sigma_rad: float = math.pi / 6,
+        robot: RobotParams | None = None,
+        beam: BeamParams | None = None,
+        nominal_robot: RobotParams | None = None,
+        nominal_beam: BeamParams | None = None,
+        task: TaskParams | None = None,
+        disturbance: DisturbanceParams | None = None,
+    ) -> None:
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, RENDER_MODES)
+        self.render_mode = render_mode
+        self.config = TransportConfig(
+            control_mode=control_mode,
+            constraint_mode=constraint_mode,
+            sigma_rad=sigma_rad,
+            robot=robot or RobotParams(),
+            beam=beam or BeamParams(),
+            nominal_robot=nominal_robot,
+            nominal_beam=nominal_beam,
+            task=task or TaskParams(),
+            disturbance=disturbance or DisturbanceParams(),
+        )
+        self.engine = TransportEngine(self.config, num_envs=1)
+        self.observation_space = observation_space(self.engine)
+        self.action_space = action_space(self.engine)
+        self._renderer: TransportRenderer | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start an episode; see "Starting State" for ``options``."""
+        super().reset(seed=seed)
+        observation, info = self.engine.reset(seeds=[seed], options=options)
+        if self.render_mode == "human":
+            self.render()
+        return observation[0], _single(info)
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Advance one control period (20 ms).
+
+        Raises:
+            ActionError: wrong shape or values that are not finite.
+        """
+        result = self.engine.step(np.expand_dims(np.asarray(action), 0))
+        if self.render_mode == "human":
+            self.render()
+        return (
+            result.observation[0],
+            float(result.reward[0]),
+            bool(result.terminated[0]),
+            False,
+            _single(result.info),
+        )
+
+    def render(self) -> Any:
+        """Return an image, (480, 640, 3) uint8 or depth (480, 640) float32, or show a window.
+
+        Raises:
+            RenderingError: the machine offers no OpenGL.
+        """
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing without a render_mode at construction.")
+            return None
+        if self._renderer is None:
+            self._renderer = TransportRenderer(self.engine)
+        return self._renderer.render(self.render_mode)
+
+    def close(self) -> None:
+        """Free the renderer."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def observation_space(engine: TransportEngine) -> spaces.Box:
+    """Return the observation space of one episode."""
+    return spaces.Box(-np.inf, np.inf, (engine.layout.size,), np.float64)
+
+
+def action_space(engine: TransportEngine) -> spaces.Box:
+    """Return the action space of one episode."""
+    return spaces.Box(-1.0, 1.0, (engine.action_size,), np.float64)
+
+
+def _single(info: dict[str, Any]) -> dict[str, Any]:
+    return {key: value[0].item() for key, value in info.items()}

@@ -1,0 +1,74 @@
+"""Where episodes start: sampled, the paper's, or given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.workspace import in_workspace
+from defmanip_gym.errors import StartError
+from defmanip_gym.params import StartParams
+
+Array = NDArray[np.float64]
+
+PAPER_START = StartParams().center
+_ALLOWED = "'sampled', 'paper', or (x, y, θ, q1, q2, φ)"
+
+
+def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | None:
+    """Return the starts that reset options ask for, (count, 6), or None for sampled ones.
+
+    Raises:
+        StartError: unknown option, or a start that is not six finite numbers (or six for each
+            of ``count`` environments).
+    """
+    if not options:
+        return None
+    unknown = set(options) - {"start"}
+    if unknown:
+        raise StartError("options", sorted(unknown), "the key 'start'", f"Use start={_ALLOWED}.")
+    start = options.get("start", "sampled")
+    if isinstance(start, str):
+        if start == "sampled":
+            return None
+        if start == "paper":
+            return np.tile(PAPER_START, (count, 1))
+        raise StartError("start", start, _ALLOWED, "Check the spelling.")
+    try:
+        values = np.asarray(start, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape not in ((6,), (count, 6)) or not np.isfinite(values).all():
+        raise StartError("start", start, _ALLOWED, "Give six finite numbers in m and rad.")
+    return np.broadcast_to(values, (count, 6)).copy()
+
+
+def sample_start(params: StartParams, generator: np.random.Generator) -> Array:
+    """Return one start, (6,), uniform within the spread."""
+    return np.array(params.center) + np.array(params.spread) * generator.uniform(-1.0, 1.0, 6)
+
+
+def check_starts(starts: Array, config: TransportConfig) -> None:
+    """Raise StartError unless every start (k, 6) lies in the workspace and within σ."""
+    inside = in_workspace(starts[:, :3], starts[:, 3:5], config)
+    within = np.abs(starts[:, 5]) <= config.sigma_rad
+    for start, reachable, straight in zip(starts, inside, within, strict=True):
+        if not reachable:
+            raise StartError(
+                "start",
+                start.tolist(),
+                "a pose inside the workspace",
+                f"Stay within {config.task.arena_radius_m:g} m of the goal, keep the elbow bent "
+                "(-π < q2 < 0) and the grasp above the floor.",
+            )
+        if not straight:
+            raise StartError(
+                "start swing",
+                float(start[5]),
+                f"|φ| <= σ = {config.sigma_rad:.4g} rad",
+                "Start within the constraint.",
+            )

@@ -1,0 +1,187 @@
+"""``DeformTransport-v0`` for n episodes at once: the engine's own face."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
+from defmanip_gym.envs.deform_transport import action_space, observation_space
+from defmanip_gym.envs.engine import TransportEngine
+from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
+from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
+from defmanip_gym.params import BeamParams, DisturbanceParams, RobotParams, TaskParams
+from defmanip_gym.validation import require_choice, require_whole
+
+Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Array, Array, Array]):
+    """n episodes of :class:`~defmanip_gym.envs.deform_transport.DeformTransportEnv` in one batch.
+
+    Everything but the arguments below is as documented there. In ``info`` every key holds an
+    array over the episodes.
+
+    Args:
+        num_envs: n.
+        max_episode_steps: control periods until truncation.
+        autoreset_mode: ``SAME_STEP`` (default) resets an ended episode within the step and puts
+            its last observation and info in ``info["final_obs"]`` and ``info["final_info"]``;
+            ``NEXT_STEP`` resets it in the following step, whose action it ignores; ``DISABLED``
+            leaves that to ``reset(options={"reset_mask": mask})``.
+        num_threads: physics threads, 0 for one per CPU.
+        render_mode: as in the single environment; ``render`` returns a tuple of n images.
+        control_mode: as in the single environment, like all that follow.
+        constraint_mode: see there.
+        sigma_rad: see there.
+        robot: see there.
+        beam: see there.
+        nominal_robot: see there.
+        nominal_beam: see there.
+        task: see there.
+        disturbance: see there.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - replaced per instance
+        "render_modes": list(RENDER_MODES[1:]),
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int = MAX_EPISODE_STEPS,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        num_threads: int = 0,
+        render_mode: str | None = None,
+        control_mode: ControlMode = "task",
+        constraint_mode: ConstraintMode = "terminate",
+        sigma_rad: float = math.pi / 6,
+        robot: RobotParams | None = None,
+        beam: BeamParams | None = None,
+        nominal_robot: RobotParams | None = None,
+        nominal_beam: BeamParams | None = None,
+        task: TaskParams | None = None,
+        disturbance: DisturbanceParams | None = None,
+    ) -> None:
+        require_whole("num_envs", num_envs, 1)
+        require_whole("max_episode_steps", max_episode_steps, 1)
+        require_whole("num_threads", num_threads, 0)
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, RENDER_MODES[1:])
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.max_episode_steps = max_episode_steps
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
+        self.config = TransportConfig(
+            control_mode=control_mode,
+            constraint_mode=constraint_mode,
+            sigma_rad=sigma_rad,
+            robot=robot or RobotParams(),
+            beam=beam or BeamParams(),
+            nominal_robot=nominal_robot,
+            nominal_beam=nominal_beam,
+            task=task or TaskParams(),
+            disturbance=disturbance or DisturbanceParams(),
+        )
+        self.engine = TransportEngine(self.config, num_envs, num_threads)
+        self.single_observation_space = observation_space(self.engine)
+        self.single_action_space = action_space(self.engine)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._ended = np.zeros(num_envs, dtype=bool)
+        self._renderers: list[TransportRenderer] = []
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start episodes: all, or those in ``options["reset_mask"]`` (n,) bool.
+
+        Args:
+            seed: episode i gets ``seed + i``; or a seed for each of the n.
+            options: ``start`` as in the single environment, or (n, 6) of them; ``reset_mask``.
+        """
+        options = dict(options or {})
+        mask = options.pop("reset_mask", None)
+        ids = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        observation, info = self.engine.reset(
+            ids, seeds=[seeds[i] for i in ids], options=options
+        )
+        self._ended[ids] = False
+        return observation, info
+
+    def step(
+        self, actions: Array
+    ) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
+        """Advance every episode by one control period."""
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._ended.any():
+            return self._step_after_reset(actions)
+        result = self.engine.step(actions)
+        truncated = (self.engine.steps >= self.max_episode_steps) & ~result.terminated
+        self._ended = result.terminated | truncated
+        observation, info = result.observation, result.info
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+            final_info = info
+            final_obs = observation
+            observation, fresh = self.engine.reset(np.flatnonzero(self._ended))
+            keep = ~self._ended
+            observation[keep] = final_obs[keep]
+            info = {key: np.where(keep, final_info[key], fresh[key]) for key in final_info}
+            info |= {
+                "final_obs": final_obs,
+                "_final_obs": self._ended.copy(),
+                "final_info": final_info,
+                "_final_info": self._ended.copy(),
+            }
+            self._ended = np.zeros(self.num_envs, dtype=bool)
+        return observation, result.reward, result.terminated, truncated, info
+
+    def _step_after_reset(
+        self, actions: Array
+    ) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
+        """Step the running episodes and start those that ended in the previous step."""
+        fresh_ids = np.flatnonzero(self._ended)
+        fresh = self._ended.copy()
+        result = self.engine.step(np.where(fresh[:, None], 0.0, actions))
+        observation, start_info = self.engine.reset(fresh_ids)
+        observation[~fresh] = result.observation[~fresh]
+        truncated = (self.engine.steps >= self.max_episode_steps) & ~result.terminated & ~fresh
+        terminated = result.terminated & ~fresh
+        self._ended = terminated | truncated
+        info = {
+            key: np.where(fresh, start_info[key], result.info[key]) for key in result.info
+        }
+        return observation, np.where(fresh, 0.0, result.reward), terminated, truncated, info
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return an image of each episode."""
+        if self.render_mode is None:
+            return None
+        if not self._renderers:
+            self._renderers = [
+                TransportRenderer(self.engine, index=i) for i in range(self.num_envs)
+            ]
+        return tuple(renderer.render(self.render_mode) for renderer in self._renderers)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free the renderers."""
+        for renderer in self._renderers:
+            renderer.close()
+        self._renderers = []

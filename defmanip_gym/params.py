@@ -1,0 +1,258 @@
+"""Physical and task parameters: frozen, keyword-only, validated when constructed.
+
+Units stand in the names (``_m``, ``_kg``, ``_s``, ``_rad``; dampings in N·m·s/rad, stiffnesses in
+N·m/rad). Every constructor raises :class:`~defmanip_gym.errors.ParameterError`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.validation import (
+    require_between,
+    require_finite_sequence,
+    require_non_negative,
+    require_positive,
+    require_whole,
+)
+
+GRAVITY_M_S2 = 9.81
+
+# The damping that the paper designs with (Section VI); its simulated beam has a tenth of it.
+DESIGN_DAMPING = 1.0
+
+# Beyond this angle the linearization (16) says nothing useful about the beam.
+LARGEST_SIGMA_RAD = math.pi / 3
+
+
+def validated_sigma(sigma_rad: float) -> float:
+    """Return σ, the admissible deformation of Eq. (9), or raise ParameterError."""
+    require_between(
+        "sigma_rad",
+        sigma_rad,
+        0.0,
+        LARGEST_SIGMA_RAD,
+        remedy="The bounds linearize the object about hanging at rest; choose a σ below 60 degrees.",
+    )
+    return float(sigma_rad)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkParams:
+    """A uniform arm link: a rod of length, mass and radius."""
+
+    length_m: float
+    mass_kg: float
+    radius_m: float = 0.04
+
+    def __post_init__(self) -> None:
+        require_positive("length_m", self.length_m, "m")
+        require_positive("mass_kg", self.mass_kg, "kg")
+        require_positive("radius_m", self.radius_m, "m")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotParams:
+    """A unicycle base carrying a two-joint arm that moves in the vertical plane of its heading.
+
+    The limits are those of the generalized forces T_r = (f_b, α_b, τ1, τ2) of Eq. (2).
+    """
+
+    base_mass_kg: float = 50.0
+    base_yaw_inertia_kgm2: float = 2.5
+    shoulder_height_m: float = 0.4
+    upper_arm: LinkParams = field(default_factory=lambda: LinkParams(length_m=0.6, mass_kg=5.0))
+    forearm: LinkParams = field(default_factory=lambda: LinkParams(length_m=0.7, mass_kg=3.0))
+    joint_armature_kgm2: float = 1.0
+    drive_force_limit_n: float = 400.0
+    steering_torque_limit_nm: float = 120.0
+    shoulder_torque_limit_nm: float = 250.0
+    elbow_torque_limit_nm: float = 150.0
+
+    def __post_init__(self) -> None:
+        require_positive("base_mass_kg", self.base_mass_kg, "kg")
+        require_positive("base_yaw_inertia_kgm2", self.base_yaw_inertia_kgm2, "kg m²")
+        require_positive("shoulder_height_m", self.shoulder_height_m, "m")
+        require_non_negative("joint_armature_kgm2", self.joint_armature_kgm2, "kg m²")
+        for name in (
+            "drive_force_limit_n",
+            "steering_torque_limit_nm",
+            "shoulder_torque_limit_nm",
+            "elbow_torque_limit_nm",
+        ):
+            require_positive(name, getattr(self, name))
+
+    @property
+    def force_limits(self) -> tuple[float, float, float, float]:
+        """Largest |T_r|: (N, N·m, N·m, N·m)."""
+        return (
+            self.drive_force_limit_n,
+            self.steering_torque_limit_nm,
+            self.shoulder_torque_limit_nm,
+            self.elbow_torque_limit_nm,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeamParams:
+    """A uniform beam hanging from the grasp, cut into equal rigid segments joined by hinges.
+
+    ``damping`` acts on the first segment's swing measured from the vertical; the joint values act
+    between neighbouring segments. The default is the reference beam: with ``damping=1.0`` it
+    reproduces the paper's ν_max, and 0.1 is what the paper simulates.
+    """
+
+    mass_kg: float = 3.1153
+    length_m: float = 0.6
+    damping: float = 0.1
+    segment_count: int = 1
+    joint_stiffness: float = 20.0
+    joint_damping: float = 0.2
+    radius_m: float = 0.02
+
+    def __post_init__(self) -> None:
+        require_positive("mass_kg", self.mass_kg, "kg")
+        require_positive("length_m", self.length_m, "m")
+        require_non_negative("damping", self.damping, "N m s/rad")
+        require_whole("segment_count", self.segment_count, 1)
+        require_non_negative("joint_stiffness", self.joint_stiffness, "N m/rad")
+        require_non_negative("joint_damping", self.joint_damping, "N m s/rad")
+        require_positive("radius_m", self.radius_m, "m")
+
+    @property
+    def segment_mass_kg(self) -> float:
+        """Mass of one segment."""
+        return self.mass_kg / self.segment_count
+
+    @property
+    def segment_length_m(self) -> float:
+        """Length of one segment."""
+        return self.length_m / self.segment_count
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardParams:
+    """Weights of the reward terms; see the environment's documentation for their formulas."""
+
+    distance_weight_per_m: float = 1.0
+    closeness_weight: float = 1.0
+    time_cost_per_step: float = 0.01
+    effort_weight: float = 0.001
+    success_bonus: float = 10.0
+    failure_penalty: float = 10.0
+    deformation_penalty: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            require_non_negative(name, getattr(self, name))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StartParams:
+    """Where episodes start: uniformly within ``spread`` of ``center``, at rest.
+
+    Both are (x, y, θ, q1, q2, φ); the center is the start of the paper's simulation.
+    """
+
+    center: tuple[float, ...] = (-8.5, 5.5, 0.0, math.pi / 3, -math.pi / 2, 0.0)
+    spread: tuple[float, ...] = (1.5, 1.5, 0.5, 0.1, 0.1, 0.05)
+
+    def __post_init__(self) -> None:
+        require_finite_sequence("center", self.center, 6)
+        require_finite_sequence("spread", self.spread, 6)
+        if min(self.spread) < 0:
+            raise ParameterError("spread", self.spread, "6 numbers >= 0", "Give half-widths.")
+
+    @property
+    def largest_swing_rad(self) -> float:
+        """The largest initial |φ| that sampling can give."""
+        return abs(self.center[5]) + self.spread[5]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskParams:
+    """Goal, tolerances, limits and timing of the transport task.
+
+    ``goal`` is (x, y, θ, q1, q2, φ) as in the paper's Section VI.
+    """
+
+    goal: tuple[float, ...] = (0.0, 0.0, 0.0, math.pi / 2, -math.pi / 2, 0.0)
+    start: StartParams = field(default_factory=StartParams)
+    max_acceleration_m_s2: float = 3.0
+    max_speed_m_s: float = 2.0
+    position_tolerance_m: float = 0.05
+    speed_tolerance_m_s: float = 0.05
+    swing_tolerance_rad: float = 0.05
+    heading_tolerance_rad: float = 0.2
+    arena_radius_m: float = 20.0
+    smallest_elbow_bend_rad: float = 0.15
+    smallest_reach_m: float = 0.25
+    smallest_grasp_height_m: float = 0.1
+    control_period_s: float = 0.02
+    physics_period_s: float = 0.005
+    reward: RewardParams = field(default_factory=RewardParams)
+
+    def __post_init__(self) -> None:
+        require_finite_sequence("goal", self.goal, 6)
+        for name, unit in (
+            ("max_acceleration_m_s2", "m/s²"),
+            ("max_speed_m_s", "m/s"),
+            ("position_tolerance_m", "m"),
+            ("speed_tolerance_m_s", "m/s"),
+            ("swing_tolerance_rad", "rad"),
+            ("heading_tolerance_rad", "rad"),
+            ("arena_radius_m", "m"),
+            ("smallest_reach_m", "m"),
+            ("smallest_grasp_height_m", "m"),
+            ("control_period_s", "s"),
+            ("physics_period_s", "s"),
+        ):
+            require_positive(name, getattr(self, name), unit)
+        require_between("smallest_elbow_bend_rad", self.smallest_elbow_bend_rad, 0.0, math.pi / 2)
+        ratio = self.control_period_s / self.physics_period_s
+        if ratio < 1 or abs(ratio - round(ratio)) > 1e-9:
+            raise ParameterError(
+                "control_period_s",
+                self.control_period_s,
+                f"a whole multiple of physics_period_s={self.physics_period_s}",
+                "Change one of the two periods.",
+            )
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in one control period."""
+        return round(self.control_period_s / self.physics_period_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisturbanceParams:
+    """What disturbs the robot: forces at the grasp and noise in its sensors.
+
+    The force ``force_amplitude_n · sin(force_frequency_rad_s · t) + force_bias_n`` acts on the end
+    effector along each axis of the base frame, as in the paper's Section VI (0.005 sin t, 0.05 N).
+    The noises are the standard deviations of Gaussians added to the observed grasp force (each
+    axis) and swing angles (each segment).
+    """
+
+    force_amplitude_n: float = 0.0
+    force_frequency_rad_s: float = 1.0
+    force_bias_n: float = 0.0
+    force_sensor_noise_n: float = 0.0
+    swing_sensor_noise_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("force_amplitude_n", "force_bias_n"):
+            require_between(name, getattr(self, name), -1e4, 1e4)
+        require_non_negative("force_frequency_rad_s", self.force_frequency_rad_s, "rad/s")
+        require_non_negative("force_sensor_noise_n", self.force_sensor_noise_n, "N")
+        require_non_negative("swing_sensor_noise_rad", self.swing_sensor_noise_rad, "rad")
+
+    @property
+    def has_force(self) -> bool:
+        """Whether any force acts on the end effector."""
+        return self.force_amplitude_n != 0.0 or self.force_bias_n != 0.0
+
+
+PAPER_DISTURBANCE = DisturbanceParams(force_amplitude_n=0.005, force_bias_n=0.05)

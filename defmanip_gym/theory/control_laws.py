@@ -1,0 +1,73 @@
+"""Saturated velocity tracking (20), the PI force loop (27)–(29) and limits on acceleration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from defmanip_gym.theory.chain import Array
+from defmanip_gym.validation import require_non_negative, require_positive
+
+
+def saturated_tracking(velocity_error: Array, gain: float, bound: Array) -> Array:
+    """Return u_o = sat(L ė_z1) of Eq. (20) with L = −gain · I.
+
+    Args:
+        velocity_error: ė_z1 = ż1 − ż_1d, (..., 3) m/s.
+        gain: ε, 1/s.
+        bound: largest |u_o| on each axis, (..., 3) m/s²; the s of Eq. (19).
+    """
+    return np.clip(-gain * velocity_error, -bound, bound)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceLoopGains:
+    """k1 (dimensionless) and k2 (1/s) of Eq. (29)."""
+
+    k1: float = 0.2
+    k2: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("k1", self.k1)
+        require_non_negative("k2", self.k2)
+
+
+def force_loop(u_o: Array, error: Array, error_integral: Array, gains: ForceLoopGains) -> Array:
+    """Return w = L ė_z1 − k1 Δu_o − k2 ∫Δu_o of Eq. (29), (..., 3) m/s²."""
+    return u_o - gains.k1 * error - gains.k2 * error_integral
+
+
+def integrate_unless_saturated(
+    error_integral: Array, error: Array, w: Array, bound: Array, period_s: float
+) -> Array:
+    """Return ∫Δu_o one sample on, held where it would push a saturated w further out.
+
+    Args:
+        error_integral: ∫Δu_o so far, (..., 3) m/s.
+        error: Δu_o, (..., 3) m/s².
+        w: the command of this sample before saturation, (..., 3) m/s².
+        bound: its bound on each axis, (..., 3) m/s².
+        period_s: sampling period.
+    """
+    pushes_out = (np.abs(w) >= bound) & (np.sign(w) == -np.sign(error))
+    return error_integral + period_s * np.where(pushes_out, 0.0, error)
+
+
+def limit_speed(w: Array, velocity: Array, max_speed: float | Array, period_s: float) -> Array:
+    """Return w changed as little as needed to keep the grasp below a speed one period ahead.
+
+    Braking passes unchanged, also from above the limit, and the result is never longer than w.
+
+    Args:
+        w: commanded acceleration, (..., 3) m/s².
+        velocity: grasp velocity in the same frame, (..., 3) m/s.
+        max_speed: the limit, m/s.
+        period_s: control period.
+    """
+    ahead = velocity + period_s * w
+    speed_ahead = np.sqrt((ahead**2).sum(-1))
+    allowed = np.maximum(max_speed, np.sqrt((velocity**2).sum(-1)))
+    too_fast = speed_ahead > allowed
+    shrink = np.where(too_fast, allowed / np.where(too_fast, speed_ahead, 1.0), 1.0)
+    return np.where(too_fast[..., None], (ahead * shrink[..., None] - velocity) / period_s, w)

@@ -1,0 +1,83 @@
+"""Time integrals of impulse responses: peak-to-peak gains of stable linear systems."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.linalg import expm
+
+from defmanip_gym.theory.chain import Array
+
+_SAMPLES_PER_PERIOD = 400
+_DECAYS_OF_A_MODE = 30.0  # a mode counts until it has shrunk by e⁻³⁰
+_BLOCK = 1024
+
+
+def peak_gains(A: Array, B: Array, C: Array) -> Array:
+    """Return ∫₀^∞ |C e^{At} B| dt elementwise: the exact peak-to-peak gains.
+
+    |y_i(t)| ≤ Σ_j gain_ij · sup|u_j| for η̇ = A η + B u, y = C η from rest, and a bang-bang input
+    attains it. A trapezoidal sum; the tests hold it against the closed form of one hinge.
+
+    Args:
+        A: (k, k), Hurwitz.
+        B: (k, inputs).
+        C: (outputs, k).
+
+    Returns:
+        (outputs, inputs).
+    """
+    total = np.zeros((C.shape[0], B.shape[1]))
+    for period, response in _sampled_response(A, B, C):
+        magnitude = np.abs(response)
+        total += period * (magnitude.sum(axis=0) - 0.5 * (magnitude[0] + magnitude[-1]))
+    return total
+
+
+def peak_free_response(A: Array, start: Array, C: Array) -> Array:
+    """Return sup_t |C e^{At} start| for each output, shape (outputs,); β in Eq. (15)."""
+    peak = np.zeros(C.shape[0])
+    for _, response in _sampled_response(A, start[:, None], C):
+        peak = np.maximum(peak, np.abs(response[..., 0]).max(axis=0))
+    return peak
+
+
+def _sampled_response(A: Array, B: Array, C: Array) -> Iterator[tuple[float, Array]]:
+    """Yield sampling periods and blocks of C e^{At} B that join end to end.
+
+    The period follows the fastest mode that is still alive, so that a stiff object's quickly
+    damped vibrations do not dictate the sampling of its slow swing.
+    """
+    begin, state = 0.0, B
+    for end, speed in _stages(np.linalg.eigvals(A)):
+        longest = 2 * np.pi / speed / _SAMPLES_PER_PERIOD
+        blocks = max(1, int(np.ceil((end - begin) / longest / _BLOCK)))
+        period = (end - begin) / (blocks * _BLOCK)
+        outputs = C @ _powers(expm(A * period), _BLOCK + 1)
+        across_block = expm(A * period * _BLOCK)
+        for _ in range(blocks):
+            yield period, outputs @ state
+            state = across_block @ state
+        begin = end
+
+
+def _stages(eigenvalues: Array) -> list[tuple[float, float]]:
+    """Return (end time, fastest |λ| alive until then) in order of time."""
+    lifetimes = _DECAYS_OF_A_MODE / -eigenvalues.real
+    return [
+        (float(end), float(np.abs(eigenvalues[lifetimes >= end]).max()))
+        for end in np.unique(lifetimes)
+    ]
+
+
+def _powers(matrix: Array, count: int) -> Array:
+    """Return matrix⁰ … matrix^(count−1), shape (count, k, k)."""
+    powers = np.empty((count, *matrix.shape))
+    powers[0] = np.eye(matrix.shape[0])
+    filled, jump = 1, matrix
+    while filled < count:
+        size = min(filled, count - filled)
+        powers[filled : filled + size] = powers[:size] @ jump
+        filled, jump = filled + size, jump @ jump
+    return powers

@@ -1,0 +1,68 @@
+"""Redundancy resolution of Section IV.B: who realizes which part of the task acceleration.
+
+The base spans the horizontal plane (range of J_Ab, the paper's S_b) and the arm its complement,
+the vertical (S_a). A two-joint arm then has one self-motion left, the reach ρ; the paper's
+−k3(q̇ + k ∇φ) term drives it to the reach of the goal, with the potential ½(ρ − ρ*)². The base
+makes up for the arm's horizontal motion, so the grasp acceleration is exactly w.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defmanip_gym.params import RobotParams
+from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.robot_model import ArmKinematics
+from defmanip_gym.validation import require_positive
+
+
+class RedundancyResolution:
+    """Turns a task-space acceleration into accelerations of base and arm.
+
+    Args:
+        robot: arm geometry.
+        goal_reach_m: ρ*, the reach to settle at.
+        k: rate at which the reach approaches ρ*, 1/s.
+        k3: gain on its velocity error, 1/s.
+    """
+
+    def __init__(
+        self, robot: RobotParams, *, goal_reach_m: float, k: float = 0.5, k3: float = 2.0
+    ) -> None:
+        require_positive("goal_reach_m", goal_reach_m, "m")
+        require_positive("k", k, "1/s")
+        require_positive("k3", k3, "1/s")
+        self.kinematics = ArmKinematics(robot)
+        self.goal_reach_m, self.k, self.k3 = goal_reach_m, k, k3
+
+    def accelerations(
+        self, w: Array, pitch: Array, pitch_rate: Array, base_velocity: Array
+    ) -> Array:
+        """Return (u̇1, u̇2, α̈1, α̈2), shape (..., 4), that give the grasp the acceleration w.
+
+        Args:
+            w: (..., 3) m/s², base frame.
+            pitch: α of the arm, (..., 2) rad, away from a straight or folded elbow.
+            pitch_rate: α̇, (..., 2) rad/s.
+            base_velocity: (u1, u2), (..., 2).
+        """
+        u1, u2 = base_velocity[..., 0], base_velocity[..., 1]
+        reach = self.kinematics.reach_and_height(pitch)[..., 0]
+        jacobian = self.kinematics.jacobian(pitch)
+        reach_rate = (jacobian[..., 0, :] * pitch_rate).sum(-1)
+        reach_acceleration = -self.k3 * (reach_rate + self.k * (reach - self.goal_reach_m))
+        desired = np.stack((reach_acceleration, w[..., 2]), axis=-1)
+        desired = desired - self.kinematics.bias_acceleration(pitch, pitch_rate)
+        determinant = (
+            jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        )
+        accelerations = np.empty((*reach.shape, 4))
+        accelerations[..., 0] = w[..., 0] - reach_acceleration + reach * u2**2
+        accelerations[..., 1] = (w[..., 1] - 2 * reach_rate * u2 - u1 * u2) / reach
+        accelerations[..., 2] = (
+            jacobian[..., 1, 1] * desired[..., 0] - jacobian[..., 0, 1] * desired[..., 1]
+        ) / determinant
+        accelerations[..., 3] = (
+            jacobian[..., 0, 0] * desired[..., 1] - jacobian[..., 1, 0] * desired[..., 0]
+        ) / determinant
+        return accelerations

@@ -1,0 +1,87 @@
+"""Mobile manipulator of Section II.A: grasp kinematics (1) and dynamics (2), combined form (7).
+
+Configuration of the arm: relative joint angles q_a = (q1, q2), absolute pitches α = (q1, q1 + q2).
+Quasi-velocities u = (u1, u2, q̇1, q̇2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.theory.chain import Array, YawingChain, arm_links, beam_links
+
+# α̇ = JOINT_TO_PITCH q̇_a for the two joints of the arm
+JOINT_TO_PITCH = np.array([[1.0, 0.0], [1.0, 1.0]])
+PITCH_TO_JOINT = np.linalg.inv(JOINT_TO_PITCH)
+
+
+class ArmKinematics:
+    """Where the grasp is, and how it moves: Eq. (1) in the base frame.
+
+    Args:
+        robot: lengths and shoulder height.
+    """
+
+    def __init__(self, robot: RobotParams) -> None:
+        self.lengths = np.array([robot.upper_arm.length_m, robot.forearm.length_m])
+        self.shoulder_height = robot.shoulder_height_m
+
+    def reach_and_height(self, pitch: Array) -> Array:
+        """Return (ρ, z), shape (..., 2) in m, of the grasp for pitches (..., 2) in rad."""
+        return np.stack(
+            (
+                (self.lengths * np.cos(pitch)).sum(-1),
+                (self.lengths * np.sin(pitch)).sum(-1) + self.shoulder_height,
+            ),
+            axis=-1,
+        )
+
+    def jacobian(self, pitch: Array) -> Array:
+        """Return d(ρ, z)/dα, shape (..., 2, 2), in m/rad."""
+        return np.stack((-self.lengths * np.sin(pitch), self.lengths * np.cos(pitch)), axis=-2)
+
+    def bias_acceleration(self, pitch: Array, pitch_rate: Array) -> Array:
+        """Return (ρ̈, z̈) at α̈ = 0, shape (..., 2) in m/s²."""
+        squared = pitch_rate**2
+        return -np.stack(
+            (
+                (self.lengths * np.cos(pitch) * squared).sum(-1),
+                (self.lengths * np.sin(pitch) * squared).sum(-1),
+            ),
+            axis=-1,
+        )
+
+    def task_jacobian(self, pitch: Array) -> Array:
+        """Return J_A of Eq. (1) in the base frame, shape (..., 3, 4), for u = (u1, u2, q̇1, q̇2)."""
+        reach = self.reach_and_height(pitch)[..., 0]
+        arm = self.jacobian(pitch) @ JOINT_TO_PITCH
+        jacobian = np.zeros((*reach.shape, 3, 4))
+        jacobian[..., 0, 0] = 1.0
+        jacobian[..., 1, 1] = reach
+        jacobian[..., 0, 2:] = arm[..., 0, :]
+        jacobian[..., 2, 2:] = arm[..., 1, :]
+        return jacobian
+
+
+def robot_chain(robot: RobotParams, beam: BeamParams | None = None) -> YawingChain:
+    """Return the chain of the robot alone, Eq. (2), or carrying the beam, Eq. (7)."""
+    links = arm_links(robot) + (beam_links(beam) if beam is not None else ())
+    rotor = np.zeros((len(links), len(links)))
+    rotor[:2, :2] = robot.joint_armature_kgm2 * PITCH_TO_JOINT.T @ PITCH_TO_JOINT
+    return YawingChain(
+        links,
+        base_mass_kg=robot.base_mass_kg,
+        base_yaw_inertia_kgm2=robot.base_yaw_inertia_kgm2,
+        rotor_inertia=rotor,
+    )
+
+
+def task_inertia(robot: RobotParams, pitch: Array) -> Array:
+    """Return 𝓜 = (J_A M_r⁻¹ J_Aᵀ)⁻¹ of Eq. (4) in the base frame, shape (..., 3, 3), kg."""
+    chain = robot_chain(robot)
+    to_pitch = np.eye(4)
+    to_pitch[2:, 2:] = JOINT_TO_PITCH
+    inertia = to_pitch.T @ chain.mass_matrix(pitch) @ to_pitch
+    jacobian = ArmKinematics(robot).task_jacobian(pitch)
+    return np.linalg.inv(jacobian @ np.linalg.inv(inertia) @ np.swapaxes(jacobian, -1, -2))

@@ -1,0 +1,61 @@
+"""Checks of single values; each raises one of the package's own errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+
+from defmanip_gym.errors import InvalidValueError, ParameterError
+
+
+def require_positive(name: str, value: float, unit: str = "") -> None:
+    """Raise ParameterError unless ``value`` is a finite number above zero."""
+    _require(name, value, lambda number: number > 0, f"a finite number > 0 {unit}".rstrip())
+
+
+def require_non_negative(name: str, value: float, unit: str = "") -> None:
+    """Raise ParameterError unless ``value`` is a finite number, zero or above."""
+    _require(name, value, lambda number: number >= 0, f"a finite number >= 0 {unit}".rstrip())
+
+
+def require_between(
+    name: str, value: float, low: float, high: float, *, remedy: str = "Choose one inside."
+) -> None:
+    """Raise ParameterError unless ``low < value < high``."""
+    _require(name, value, lambda number: low < number < high, f"{low:g} < {name} < {high:g}", remedy)
+
+
+def require_whole(name: str, value: int, low: int) -> None:
+    """Raise ParameterError unless ``value`` is a whole number, ``low`` or above."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < low:
+        raise ParameterError(name, value, f"a whole number >= {low}", "Choose one inside.")
+
+
+def require_finite_sequence(name: str, values: Sequence[float], length: int) -> None:
+    """Raise ParameterError unless ``values`` holds ``length`` finite numbers."""
+    if len(values) != length or not all(_is_finite_number(value) for value in values):
+        raise ParameterError(name, values, f"{length} finite numbers", "Check their count and values.")
+
+
+def require_choice(
+    name: str,
+    value: object,
+    choices: Collection[str],
+    error: type[InvalidValueError] = ParameterError,
+) -> None:
+    """Raise ``error`` unless ``value`` is one of ``choices``."""
+    if value not in choices:
+        listed = ", ".join(repr(choice) for choice in choices)
+        raise error(name, value, f"one of {listed}", "Check the spelling.")
+
+
+def _require(name, value, condition, allowed: str, remedy: str = "Choose one inside.") -> None:  # type: ignore[no-untyped-def]
+    if not _is_finite_number(value) or not condition(value):
+        raise ParameterError(name, value, allowed, remedy)
+
+
+def _is_finite_number(value: object) -> bool:
+    try:
+        return math.isfinite(value)  # type: ignore[arg-type]
+    except TypeError:
+        return False
