@@ -42,7 +42,7 @@ def build_model(
     spec.modelname = "deform_transport"
     spec.option.timestep = physics_period_s
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_S2]
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     dress(spec, goal_position_m)
     base = _add_base(spec, robot)

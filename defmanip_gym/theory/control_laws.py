@@ -10,15 +10,18 @@ from defmanip_gym.theory.chain import Array
 from defmanip_gym.validation import require_non_negative, require_positive
 
 
-def saturated_tracking(velocity_error: Array, gain: float, bound: Array) -> Array:
-    """Return u_o = sat(L ė_z1) of Eq. (20) with L = −gain · I.
+def saturated_tracking(
+    velocity_error: Array, gain: float, bound: Array, feedforward: Array | float = 0.0
+) -> Array:
+    """Return u_o = sat(L ė_z1 + z̈_1d) of Eq. (20) with L = −gain · I.
 
     Args:
         velocity_error: ė_z1 = ż1 − ż_1d, (..., 3) m/s.
         gain: ε, 1/s.
         bound: largest |u_o| on each axis, (..., 3) m/s²; the s of Eq. (19).
+        feedforward: z̈_1d, (..., 3) m/s²; the paper lets it be zero.
     """
-    return np.clip(-gain * velocity_error, -bound, bound)
+    return np.clip(feedforward - gain * velocity_error, -bound, bound)
 
 
 @dataclass(frozen=True, kw_only=True)

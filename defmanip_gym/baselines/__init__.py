@@ -1,0 +1,1 @@
+"""Controllers behind one interface, Stable-Baselines3's ``predict``."""

@@ -1,0 +1,251 @@
+"""The paper's controller as a policy: velocity field, tracking, PI force loop (Sections III–IV).
+
+Its output w goes to the environment, whose inner loop is the feedback linearization (28) with the
+redundancy resolution of Section IV.B.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defmanip_gym.baselines.controller import State
+from defmanip_gym.errors import CertificateError, GainError
+from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.params import BeamParams, RobotParams, TaskParams
+from defmanip_gym.theory.certificates import Certificate
+from defmanip_gym.theory.control_laws import (
+    ForceLoopGains,
+    force_loop,
+    integrate_unless_saturated,
+    saturated_tracking,
+)
+from defmanip_gym.theory.frames import base_to_world, world_to_base
+from defmanip_gym.theory.object_model import HangingBeam
+from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.stability import SampledLoop
+from defmanip_gym.theory.velocity_field import LiteralField, NormalizedField, VelocityField
+from defmanip_gym.validation import require_choice, require_positive
+
+Array = NDArray[np.float64]
+FieldKind = Literal["normalized", "literal"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TannerParams:
+    """Design choices of the controller that are not the robot's or the object's.
+
+    Attributes:
+        velocity_field: ``"normalized"`` travels the dipole's streamlines with a speed profile,
+            ``"literal"`` is −k ∇φ as printed.
+        literal_k: k of the literal field.
+        tracking_gain: ε in L = −ε I, 1/s.
+        approach_rate: speed per distance near the goal, 1/s.
+        feedforward: add z̈_1d, the field's change along the motion; the paper has none.
+        gains: k1 and k2 of the force loop (29).
+        force_law_damping: d̂ assumed in the force law (10). Zero lets the force loop add damping;
+            more than 4/3 of the true value destabilizes a uniform rod.
+        acceleration_bound: bound on u_o where no certificate gives one, m/s².
+        yaw_rate_bound: where no certificate gives one, rad/s.
+        deceleration_share: share of the bound that the speed profile plans to brake with.
+    """
+
+    velocity_field: FieldKind = "normalized"
+    literal_k: float = 1.0
+    tracking_gain: float = 2.0
+    approach_rate: float = 0.5
+    feedforward: bool = True
+    gains: ForceLoopGains = field(default_factory=lambda: ForceLoopGains(k1=0.5, k2=2.0))
+    force_law_damping: float = 0.0
+    acceleration_bound: float = 1.0
+    yaw_rate_bound: float = 1.0
+    deceleration_share: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_choice("velocity_field", self.velocity_field, get_args(FieldKind))
+        for name in (
+            "literal_k",
+            "tracking_gain",
+            "approach_rate",
+            "acceleration_bound",
+            "yaw_rate_bound",
+            "deceleration_share",
+        ):
+            require_positive(name, getattr(self, name))
+
+
+class TannerController:
+    """Velocity-field tracking with PI force feedback, within a certificate's bounds if one is given.
+
+    Args:
+        beam: the object as the controller knows it.
+        robot: the robot as the controller knows it.
+        task: goal, limits and control period.
+        certificate: bounds on the motion.
+        params: design choices.
+
+    Raises:
+        GainError: the sampled loop would be unstable with these gains (THEORY: sampled condition).
+        CertificateError: the certificate is for another number of segments.
+    """
+
+    def __init__(
+        self,
+        *,
+        beam: BeamParams | None = None,
+        robot: RobotParams | None = None,
+        task: TaskParams | None = None,
+        certificate: Certificate | None = None,
+        params: TannerParams | None = None,
+    ) -> None:
+        self.beam, self.robot = beam or BeamParams(), robot or RobotParams()
+        self.task, self.params = task or TaskParams(), params or TannerParams()
+        self.certificate = certificate
+        self.layout = ObservationLayout(self.beam.segment_count)
+        self.object = HangingBeam(self.beam, damping=self.params.force_law_damping)
+        self.kinematics = ArmKinematics(self.robot)
+        self._check_certificate()
+        self._check_gains()
+        self.bound, self.yaw_rate_bound, max_speed = self._bounds()
+        self.field = self._velocity_field(max_speed)
+
+    def predict(
+        self,
+        observation: Array,
+        state: State | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[Array, State | None]:
+        """Return w / a_max and (∫Δu_o, the u_o of this sample)."""
+        batch = np.atleast_2d(observation)
+        error_integral, u_o_before = self._memory(len(batch), state, episode_start)
+
+        def part(name: str) -> Array:
+            return self.layout.part(batch, name)
+
+        heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
+        velocity, yaw_rate = part("grasp_velocity_b"), part("base_velocity")[:, 1]
+        desired, desired_rate = self._desired_motion(part("goal_offset_b"), velocity, heading)
+        u_o = saturated_tracking(
+            velocity - self._with_gentle_turn(desired, part("joints")),
+            self.params.tracking_gain,
+            self.bound,
+            desired_rate,
+        )
+        # Section IV: Δu_o compares the measured force with the one the last u_o called for
+        error = self.object.acceleration_error(
+            part("swing"), part("swing_rate"), yaw_rate, u_o_before, part("grasp_force_b")
+        )
+        advanced = error_integral + self.task.control_period_s * error
+        w = force_loop(u_o, error, advanced, self.params.gains)
+        error_integral = integrate_unless_saturated(
+            error_integral, error, w, self.bound, self.task.control_period_s
+        )
+        action = np.clip(w, -self.bound, self.bound) / self.task.max_acceleration_m_s2
+        return action.reshape(*observation.shape[:-1], 3), (error_integral, u_o)
+
+    def _desired_motion(
+        self, goal_offset_b: Array, velocity_b: Array, heading: Array
+    ) -> tuple[Array, Array]:
+        """Return ż_1d of Section IV.A and its rate of change along the motion, (n, 3) each.
+
+        The field lives in world axes with the goal at the origin. The paper lets z̈_1d = 0; without
+        it the grasp drifts off the streamline and arrives with the wrong heading.
+        """
+        position = base_to_world(-goal_offset_b, heading)
+        desired = self.field.velocity(position)
+        if not self.params.feedforward:
+            return world_to_base(desired, heading), np.zeros_like(desired)
+        period = self.task.control_period_s
+        ahead = self.field.velocity(position + period * base_to_world(velocity_b, heading))
+        rate = (ahead - desired) / period
+        return world_to_base(desired, heading), world_to_base(rate, heading)
+
+    def _memory(
+        self, count: int, state: State | None, episode_start: NDArray[np.bool_] | None
+    ) -> tuple[Array, Array]:
+        """Return integral and previous u_o, (n, 3) each, zero where an episode starts."""
+        if state is None:
+            return np.zeros((count, 3)), np.zeros((count, 3))
+        if episode_start is None:
+            return state[0], state[1]
+        running = ~np.atleast_1d(episode_start)[:, None]
+        return state[0] * running, state[1] * running
+
+    def _with_gentle_turn(self, desired: Array, joints: Array) -> Array:
+        """Bound the leftward velocity, which is reach times yaw rate."""
+        reach = self.kinematics.reach_and_height(joints @ JOINT_TO_PITCH.T)[:, 0]
+        limit = 0.8 * self.yaw_rate_bound * reach
+        return np.stack(
+            (desired[:, 0], np.clip(desired[:, 1], -limit, limit), desired[:, 2]), axis=1
+        )
+
+    def _bounds(self) -> tuple[Array, float, float]:
+        """Return the bound on w per axis (m/s²), on the yaw rate and on the speed."""
+        params, certificate = self.params, self.certificate
+        if certificate is None:
+            forward = min(params.acceleration_bound, self.task.max_acceleration_m_s2)
+            return np.full(3, forward), params.yaw_rate_bound, 0.9 * self.task.max_speed_m_s
+        conditions = certificate.conditions
+        forward = min(certificate.acceleration_bound, self.task.max_acceleration_m_s2)
+        upward = min(conditions.vertical_acceleration_m_s2, self.task.max_acceleration_m_s2)
+        yaw_rate = min(conditions.yaw_rate_rad_s, params.yaw_rate_bound)
+        leftward = self.task.max_acceleration_m_s2 if math.isinf(certificate.speed_bound) else forward
+        speed = 0.9 * min(self.task.max_speed_m_s, certificate.speed_bound)
+        return np.array([forward, leftward, upward]), yaw_rate, speed
+
+    def _velocity_field(self, max_speed: float) -> VelocityField:
+        if self.params.velocity_field == "literal":
+            return LiteralField(k=self.params.literal_k)
+        share = self.params.deceleration_share
+        return NormalizedField(
+            max_speed_m_s=max_speed,
+            deceleration_m_s2=share * self.bound[0],
+            vertical_deceleration_m_s2=share * self.bound[2],
+            approach_rate_per_s=self.params.approach_rate,
+        )
+
+    def _check_certificate(self) -> None:
+        certificate = self.certificate
+        if certificate is None:
+            return
+        if certificate.beam.segment_count != self.beam.segment_count:
+            raise CertificateError(
+                "certificate.beam.segment_count",
+                certificate.beam.segment_count,
+                f"{self.beam.segment_count}, that of the beam carried",
+                "Compute the certificate for this beam.",
+            )
+        if min(certificate.conditions.vertical_acceleration_m_s2, certificate.conditions.yaw_rate_rad_s) <= 0:
+            raise CertificateError(
+                "certificate.conditions",
+                certificate.conditions,
+                "room for vertical acceleration and yaw rate",
+                "Pass conditions=TRANSPORT_CONDITIONS to certify().",
+            )
+
+    def _check_gains(self) -> None:
+        loop = SampledLoop(
+            robot=self.robot,
+            goal_pitch=JOINT_TO_PITCH @ np.array(self.task.goal[3:5]),
+            beam=self.beam,
+            linearization_beam=self.beam,
+            force_law_damping=self.params.force_law_damping,
+            gains=self.params.gains,
+            tracking_gain=self.params.tracking_gain,
+            approach_rate=self.params.approach_rate,
+            period_s=self.task.control_period_s,
+        )
+        radius = loop.spectral_radius()
+        if radius >= 1.0:
+            gains = self.params.gains
+            raise GainError(
+                "(k1, k2, force_law_damping)",
+                (gains.k1, gains.k2, self.params.force_law_damping),
+                f"gains with a spectral radius below 1 over a sample (here {radius:.5f})",
+                "Lower k1 or k2, or assume less damping in the force law.",
+            )
