@@ -34,7 +34,7 @@ def validated_sigma(sigma_rad: float) -> float:
         sigma_rad,
         0.0,
         LARGEST_SIGMA_RAD,
-        remedy="The bounds linearize the object about hanging at rest; choose a σ below 60 degrees.",
+        remedy="The bounds linearize about hanging at rest; choose a σ below 60 degrees.",
     )
     return float(sigma_rad)
 
@@ -137,8 +137,9 @@ class RewardParams:
     """Weights of the reward terms; see the environment's documentation for their formulas."""
 
     distance_weight_per_m: float = 1.0
-    closeness_weight: float = 1.0
-    time_cost_per_step: float = 0.01
+    course_weight_per_rad: float = 2.0
+    closeness_weight: float = 2.0
+    time_cost_per_step: float = 0.02
     effort_weight: float = 0.001
     success_bonus: float = 10.0
     failure_penalty: float = 10.0
@@ -186,6 +187,7 @@ class TaskParams:
     speed_tolerance_m_s: float = 0.05
     swing_tolerance_rad: float = 0.05
     heading_tolerance_rad: float = 0.2
+    course_blend_radius_m: float = 0.2
     arena_radius_m: float = 20.0
     smallest_elbow_bend_rad: float = 0.15
     smallest_reach_m: float = 0.25
@@ -203,6 +205,7 @@ class TaskParams:
             ("speed_tolerance_m_s", "m/s"),
             ("swing_tolerance_rad", "rad"),
             ("heading_tolerance_rad", "rad"),
+            ("course_blend_radius_m", "m"),
             ("arena_radius_m", "m"),
             ("smallest_reach_m", "m"),
             ("smallest_grasp_height_m", "m"),

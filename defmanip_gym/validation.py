@@ -22,7 +22,9 @@ def require_between(
     name: str, value: float, low: float, high: float, *, remedy: str = "Choose one inside."
 ) -> None:
     """Raise ParameterError unless ``low < value < high``."""
-    _require(name, value, lambda number: low < number < high, f"{low:g} < {name} < {high:g}", remedy)
+    _require(
+        name, value, lambda number: low < number < high, f"{low:g} < {name} < {high:g}", remedy
+    )
 
 
 def require_whole(name: str, value: int, low: int) -> None:
@@ -34,7 +36,9 @@ def require_whole(name: str, value: int, low: int) -> None:
 def require_finite_sequence(name: str, values: Sequence[float], length: int) -> None:
     """Raise ParameterError unless ``values`` holds ``length`` finite numbers."""
     if len(values) != length or not all(_is_finite_number(value) for value in values):
-        raise ParameterError(name, values, f"{length} finite numbers", "Check their count and values.")
+        raise ParameterError(
+            name, values, f"{length} finite numbers", "Check their count and values."
+        )
 
 
 def require_choice(

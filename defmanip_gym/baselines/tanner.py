@@ -79,7 +79,7 @@ class TannerParams:
 
 
 class TannerController:
-    """Velocity-field tracking with PI force feedback, within a certificate's bounds if one is given.
+    """Velocity-field tracking with PI force feedback, within a certificate's bounds if given one.
 
     Args:
         beam: the object as the controller knows it.
@@ -89,7 +89,7 @@ class TannerController:
         params: design choices.
 
     Raises:
-        GainError: the sampled loop would be unstable with these gains (THEORY: sampled condition).
+        GainError: the sampled loop would be unstable with these gains.
         CertificateError: the certificate is for another number of segments.
     """
 
@@ -192,9 +192,11 @@ class TannerController:
             return np.full(3, forward), params.yaw_rate_bound, 0.9 * self.task.max_speed_m_s
         conditions = certificate.conditions
         forward = min(certificate.acceleration_bound, self.task.max_acceleration_m_s2)
-        upward = min(conditions.vertical_acceleration_m_s2, self.task.max_acceleration_m_s2)
+        upward = min(certificate.vertical_acceleration_bound, self.task.max_acceleration_m_s2)
         yaw_rate = min(conditions.yaw_rate_rad_s, params.yaw_rate_bound)
-        leftward = self.task.max_acceleration_m_s2 if math.isinf(certificate.speed_bound) else forward
+        leftward = (
+            self.task.max_acceleration_m_s2 if math.isinf(certificate.speed_bound) else forward
+        )
         speed = 0.9 * min(self.task.max_speed_m_s, certificate.speed_bound)
         return np.array([forward, leftward, upward]), yaw_rate, speed
 
@@ -220,7 +222,7 @@ class TannerController:
                 f"{self.beam.segment_count}, that of the beam carried",
                 "Compute the certificate for this beam.",
             )
-        if min(certificate.conditions.vertical_acceleration_m_s2, certificate.conditions.yaw_rate_rad_s) <= 0:
+        if min(certificate.vertical_acceleration_bound, certificate.conditions.yaw_rate_rad_s) <= 0:
             raise CertificateError(
                 "certificate.conditions",
                 certificate.conditions,

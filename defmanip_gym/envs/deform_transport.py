@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -19,7 +19,7 @@ from defmanip_gym.validation import require_choice
 Array = NDArray[np.float64]
 
 
-class DeformTransportEnv(gymnasium.Env[Array, Array]):
+class DeformTransportEnv(gymnasium.Env[Any, Any]):
     """Carry a swinging or flexible beam to a goal without deforming it past σ.
 
     ## Description
@@ -34,7 +34,7 @@ class DeformTransportEnv(gymnasium.Env[Array, Array]):
     `control_mode="task"` (default): `Box(-1, 1, (3,), float64)`. The acceleration w of the grasp
     point, Eq. (29), over `task.max_acceleration_m_s2` (3 m/s²). A built-in feedback linearization
     with nominal parameters, Eq. (28), turns it into forces; a limiter keeps the grasp below
-    `task.max_speed_m_s` (2 m/s) and never hinders braking.
+    `task.max_speed_m_s` (2 m/s, to within 3 % while the beam swings hard) and never hinders braking.
 
     | Num | Action                          | Min | Max | Unit    |
     | --- | ------------------------------- | --- | --- | ------- |
@@ -68,14 +68,17 @@ class DeformTransportEnv(gymnasium.Env[Array, Array]):
     | 16-18 | grasp_force_b    | measured force on the object           | N          |
 
     ## Rewards
-    The sum of the terms below, each also in `info`. d is the distance of the grasp to the goal and
-    e the Euclidean norm of the four success errors, each over its tolerance.
+    The sum of the terms below, each also in `info`; the first three are differences of potentials.
+    d is the planar plus the vertical distance of the grasp to the goal, ψ the angle between the
+    heading and the dipole streamline (Section VI) through the grasp, blended into the heading
+    error at the goal, and e the Euclidean norm of the success errors, each over its tolerance.
 
     | Term               | Value (weights in `task.reward`)                                       |
     | ------------------ | ---------------------------------------------------------------------- |
     | reward_distance    | decrease of d, 1 per metre                                             |
-    | reward_closeness   | decrease of log(1 + e)                                                 |
-    | reward_time        | -0.01 a step                                                           |
+    | reward_course      | decrease of ψ, 2 per radian                                            |
+    | reward_closeness   | decrease of log(1 + e), times 2                                        |
+    | reward_time        | -0.02 a step                                                           |
     | reward_effort      | -0.001 times the squared norm of the action                            |
     | reward_success     | +10 on success                                                         |
     | reward_failure     | -10 on leaving the workspace, on failed physics, and in                |
@@ -115,7 +118,7 @@ class DeformTransportEnv(gymnasium.Env[Array, Array]):
     * v0: initial version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
 
     def __init__(
         self,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.simulation import PlantState, Simulation
 from defmanip_gym.theory.control_laws import limit_speed
 from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
+from defmanip_gym.theory.frames import base_to_world
 from defmanip_gym.theory.redundancy import RedundancyResolution
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 
@@ -149,7 +151,7 @@ class TransportEngine:
         terms = dict.fromkeys(_REWARD_TERMS, zeros)
         return self._observation(ids), self._info(outcome, terms, zeros)
 
-    def step(self, actions: NDArray[np.floating[Any]]) -> StepResult:
+    def step(self, actions: Array) -> StepResult:
         """Advance all episodes by one control period.
 
         Args:
@@ -160,7 +162,7 @@ class TransportEngine:
             ActionError: wrong shape or values that are not finite.
         """
         config, task = self.config, self.config.task
-        actions = np.clip(self._checked(actions), -1.0, 1.0)
+        actions = self._checked(actions)
         self.simulation.apply(self._generalized_forces(actions))
         if config.disturbance.has_force:
             self.simulation.push_grasp(self._disturbing_force())
@@ -194,12 +196,13 @@ class TransportEngine:
         excess_speed = np.maximum(state.speed_m_s - task.max_speed_m_s, 0.0)
         return StepResult(
             observation=self._observation(np.arange(self.num_envs)),
-            reward=np.sum(list(terms.values()), axis=0),
+            # term by term: np.sum adds up in an order that depends on the batch size
+            reward=reduce(np.add, terms.values()),
             terminated=terminated,
             info=self._info(outcome, terms, excess_speed),
         )
 
-    def _checked(self, actions: NDArray[np.floating[Any]]) -> Array:
+    def _checked(self, actions: Array) -> Array:
         shape = (self.num_envs, self.action_size)
         try:
             values = np.asarray(actions, dtype=np.float64)
@@ -221,7 +224,7 @@ class TransportEngine:
                 "finite numbers in [-1, 1]",
                 "Look for a diverged policy or controller.",
             )
-        return values
+        return np.minimum(np.maximum(values, -1.0), 1.0)
 
     def _generalized_forces(self, actions: Array) -> Array:
         """Return T_r: directly, or from the task acceleration by Eq. (28)."""
@@ -235,8 +238,15 @@ class TransportEngine:
             task.control_period_s,
         )
         plant = now.plant
+        # the forces act for a whole period: take them where the motion will be half-way through it
+        half = 0.5 * task.control_period_s
         return self._linearization.generalized_forces(
-            w, plant.joints, plant.joint_rates, plant.base_velocity, plant.swing, plant.swing_rate
+            w,
+            plant.joints + half * plant.joint_rates,
+            plant.joint_rates,
+            plant.base_velocity,
+            plant.swing + half * plant.swing_rate,
+            plant.swing_rate,
         )
 
     def _disturbing_force(self) -> Array:
@@ -268,16 +278,19 @@ class TransportEngine:
             ),
             axis=1,
         )
-        heading_error = heading - self.config.task.goal[2]
+        heading_error = transport.wrapped(heading - self.config.task.goal[2])
+        position = -base_to_world(offset, heading_error)[:, :2]
         state = transport.TaskState(
             distance_m=np.sqrt((offset**2).sum(axis=1)),
+            height_error_m=offset[:, 2],
             speed_m_s=np.sqrt((velocity**2).sum(axis=1)),
-            heading_error_rad=np.arctan2(np.sin(heading_error), np.cos(heading_error)),
+            heading_error_rad=heading_error,
+            course_error_rad=transport.course_error(
+                position, heading_error, self.config.task.course_blend_radius_m
+            ),
             largest_swing_rad=np.abs(plant.swing).max(axis=1),
         )
-        return _Snapshot(
-            plant=plant, grasp_velocity_b=velocity, goal_offset_b=offset, task=state
-        )
+        return _Snapshot(plant=plant, grasp_velocity_b=velocity, goal_offset_b=offset, task=state)
 
     def _observation(self, ids: Ids) -> Array:
         """Return observations of all episodes, drawing sensor noise for ``ids`` only."""
@@ -328,6 +341,7 @@ class TransportEngine:
 
 _REWARD_TERMS = (
     "reward_distance",
+    "reward_course",
     "reward_closeness",
     "reward_time",
     "reward_effort",

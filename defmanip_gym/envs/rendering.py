@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Any
 
 import mujoco
@@ -57,15 +59,24 @@ class TransportRenderer:
         engine.simulation.materialize(self._index, self._data)
         swing = float(engine.largest_swing_rad[self._index])
         self._model.geom_rgba[self._segments] = swing_color(swing, engine.config.sigma_rad)
+        if mode != "human":
+            _choose_headless_backend()
         try:
             image = self._renderer.render(mode)
         except Exception as error:  # GL back ends raise whatever they like
             raise RenderingError(
                 f"Cannot render in mode {mode!r}: {error}. Headless machines need EGL or OSMesa "
-                "(Debian: libegl1 libgl1-mesa-dri) and, if it is not found by itself, MUJOCO_GL=egl."
+                "(Debian: libegl1 libgl1-mesa-dri); MUJOCO_GL=egl or osmesa chooses one of them."
             ) from error
         return None if image is None else np.asarray(image)
 
     def close(self) -> None:
         """Free the OpenGL context."""
-        self._renderer.close()
+        self._renderer.close()  # type: ignore[no-untyped-call]
+
+
+def _choose_headless_backend() -> None:
+    """Name EGL where there is no display: Gymnasium tries GLFW first, which then fails late."""
+    displays = ("DISPLAY", "WAYLAND_DISPLAY")
+    if sys.platform == "linux" and not any(os.environ.get(name) for name in displays):
+        os.environ.setdefault("MUJOCO_GL", "egl")

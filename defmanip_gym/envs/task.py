@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.params import RewardParams, TaskParams
+from defmanip_gym.theory.velocity_field import streamline_heading
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -19,14 +20,19 @@ class TaskState:
 
     Attributes:
         distance_m: grasp to goal, (n,).
+        height_error_m: of the grasp, (n,).
         speed_m_s: of the grasp, (n,).
         heading_error_rad: θ − θ_goal wrapped to (−π, π], (n,).
+        course_error_rad: |θ − heading of the dipole streamline through the grasp|, blended into
+            |θ − θ_goal| at the goal, (n,).
         largest_swing_rad: ‖z2‖∞, (n,).
     """
 
     distance_m: Array
+    height_error_m: Array
     speed_m_s: Array
     heading_error_rad: Array
+    course_error_rad: Array
     largest_swing_rad: Array
 
 
@@ -52,18 +58,43 @@ def constraint_margin(state: TaskState, sigma_rad: float) -> Array:
     return sigma_rad - state.largest_swing_rad
 
 
-def potentials(state: TaskState, task: TaskParams) -> tuple[Array, Array]:
-    """Return the two shaping potentials, distance and closeness, each (n,).
+def wrapped(angle: Array) -> Array:
+    """Return the angle in (−π, π]."""
+    return np.arctan2(np.sin(angle), np.cos(angle))
 
-    The first pulls from afar; the second, logarithmic in the distance to the goal *set* counted
-    in tolerances, still distinguishes hovering near the goal from settling in it.
+
+def course_error(position: Array, heading_error: Array, blend_radius_m: float) -> Array:
+    """Return how far the robot is off the course that ends with the right heading, (n,) rad.
+
+    A robot that cannot move sideways must be on the right streamline long before the goal; the
+    distance alone says nothing about that.
+
+    Args:
+        position: grasp relative to the goal in axes of the goal's heading, (n, 2) m.
+        heading_error: θ − θ_goal, (n,) rad.
+        blend_radius_m: distance at which streamline and goal heading weigh the same.
+    """
+    squared = (position**2).sum(axis=1)
+    share = squared / (squared + blend_radius_m**2)
+    return np.abs(wrapped(heading_error - share * wrapped(streamline_heading(position))))
+
+
+def potentials(state: TaskState, task: TaskParams) -> dict[str, Array]:
+    """Return the shaping potentials, (n,) each, by the reward term that each one makes.
+
+    Distance and course pull from afar, the height on its own, lest it be left for last; closeness,
+    logarithmic in the distance to the goal *set* counted in tolerances, still distinguishes
+    hovering near the goal from settling in it.
     """
     reward = task.reward
+    height = np.abs(state.height_error_m)
+    planar = np.sqrt(np.maximum(state.distance_m**2 - height**2, 0.0))
     away = np.sqrt((tolerance_shares(state, task) ** 2).sum(axis=0))
-    return (
-        -reward.distance_weight_per_m * state.distance_m,
-        -reward.closeness_weight * np.log1p(away),
-    )
+    return {
+        "reward_distance": -reward.distance_weight_per_m * (planar + height),
+        "reward_course": -reward.course_weight_per_rad * state.course_error_rad,
+        "reward_closeness": -reward.closeness_weight * np.log1p(away),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +114,8 @@ class Outcome:
 
 def reward_terms(
     *,
-    before: tuple[Array, Array],
-    after: tuple[Array, Array],
+    before: dict[str, Array],
+    after: dict[str, Array],
     action: Array,
     outcome: Outcome,
     violation_ends: bool,
@@ -104,8 +135,7 @@ def reward_terms(
     """
     failure = outcome.failure | outcome.violation if violation_ends else outcome.failure
     return {
-        "reward_distance": after[0] - before[0],
-        "reward_closeness": after[1] - before[1],
+        **{name: after[name] - before[name] for name in after},
         "reward_time": np.full(excess_share.shape, -weights.time_cost_per_step),
         "reward_effort": -weights.effort_weight * (action**2).sum(axis=-1),
         "reward_success": weights.success_bonus * outcome.success,

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Array, Array, Array]):
+class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """n episodes of :class:`~defmanip_gym.envs.deform_transport.DeformTransportEnv` in one batch.
 
     Everything but the arguments below is as documented there. In ``info`` every key holds an
@@ -50,7 +50,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Array, Array, Array]):
         disturbance: see there.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012 - replaced per instance
+    metadata: dict[str, Any] = {
         "render_modes": list(RENDER_MODES[1:]),
         "render_fps": 50,
         "autoreset_mode": AutoresetMode.SAME_STEP,
@@ -121,15 +121,11 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Array, Array, Array]):
             seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
         else:
             seeds = list(seed)
-        observation, info = self.engine.reset(
-            ids, seeds=[seeds[i] for i in ids], options=options
-        )
+        observation, info = self.engine.reset(ids, seeds=[seeds[i] for i in ids], options=options)
         self._ended[ids] = False
         return observation, info
 
-    def step(
-        self, actions: Array
-    ) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
+    def step(self, actions: Array) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
         """Advance every episode by one control period."""
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._ended.any():
             return self._step_after_reset(actions)
@@ -165,9 +161,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Array, Array, Array]):
         truncated = (self.engine.steps >= self.max_episode_steps) & ~result.terminated & ~fresh
         terminated = result.terminated & ~fresh
         self._ended = terminated | truncated
-        info = {
-            key: np.where(fresh, start_info[key], result.info[key]) for key in result.info
-        }
+        info = {key: np.where(fresh, start_info[key], result.info[key]) for key in result.info}
         return observation, np.where(fresh, 0.0, result.reward), terminated, truncated, info
 
     def render(self) -> tuple[Any, ...] | None:

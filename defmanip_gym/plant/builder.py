@@ -194,7 +194,9 @@ def _add_link(body: mujoco.MjsBody, link: LinkParams, geom_name: str) -> None:
     )
 
 
-def _set_inertia(body: mujoco.MjsBody, mass: float, center: list[float], diagonal: list[float]) -> None:
+def _set_inertia(
+    body: mujoco.MjsBody, mass: float, center: list[float], diagonal: list[float]
+) -> None:
     body.explicitinertial = True
     body.mass = mass
     body.ipos = center

@@ -97,7 +97,9 @@ class YawingChain:
         self.transverse = np.array([link.transverse_inertia_kgm2 for link in links])
         self.axial = np.array([link.axial_inertia_kgm2 for link in links])
         # row i: the lengths of the links before i, then the distance of its own centre of mass
-        self.geometry = np.tril(np.tile(lengths, (count, 1)), -1) + np.diag([k.com_m for k in links])
+        self.geometry = np.tril(np.tile(lengths, (count, 1)), -1) + np.diag(
+            [k.com_m for k in links]
+        )
         self.base_mass = base_mass_kg
         self.base_yaw_inertia = base_yaw_inertia_kgm2
         self._constant_inertia = np.diag(self.transverse)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from defmanip_gym.theory.chain import Array
-from defmanip_gym.validation import require_non_negative, require_positive
+from defmanip_gym.validation import require_non_negative
 
 
 def saturated_tracking(

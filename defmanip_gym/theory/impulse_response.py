@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from defmanip_gym.theory.chain import Array
@@ -62,7 +64,7 @@ def _sampled_response(A: Array, B: Array, C: Array) -> Iterator[tuple[float, Arr
         begin = end
 
 
-def _stages(eigenvalues: Array) -> list[tuple[float, float]]:
+def _stages(eigenvalues: NDArray[Any]) -> list[tuple[float, float]]:
     """Return (end time, fastest |λ| alive until then) in order of time."""
     lifetimes = _DECAYS_OF_A_MODE / -eigenvalues.real
     return [

@@ -84,4 +84,5 @@ def task_inertia(robot: RobotParams, pitch: Array) -> Array:
     to_pitch[2:, 2:] = JOINT_TO_PITCH
     inertia = to_pitch.T @ chain.mass_matrix(pitch) @ to_pitch
     jacobian = ArmKinematics(robot).task_jacobian(pitch)
-    return np.linalg.inv(jacobian @ np.linalg.inv(inertia) @ np.swapaxes(jacobian, -1, -2))
+    mobility = jacobian @ np.linalg.inv(inertia) @ np.swapaxes(jacobian, -1, -2)
+    return np.asarray(np.linalg.inv(mobility), dtype=np.float64)

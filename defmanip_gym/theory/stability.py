@@ -88,8 +88,10 @@ class SampledLoop:
         hold = expm(np.block([[A, B[:, None]], [np.zeros((1, size + 1))]]) * self.period_s)
         advance, forced = hold[:size, :size], hold[:size, size]
 
+        # the feedback linearization looks half a period ahead (envs/engine.py)
+        half = 0.5 * self.period_s
         compensation = compliance * np.concatenate(
-            (feedthrough @ stiffness, feedthrough @ believed)
+            (feedthrough @ stiffness, feedthrough @ (believed + half * stiffness))
         )
         misjudged = feedthrough @ (damping - assumed) / apparent[0, 0]
 

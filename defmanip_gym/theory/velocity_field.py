@@ -41,6 +41,15 @@ def dipole_direction(p: Array) -> Array:
     return np.where((s > _TINY)[..., None], direction, np.stack((ahead, np.zeros_like(x)), axis=-1))
 
 
+def streamline_heading(p: Array) -> Array:
+    """Return the heading 2 atan2(p_y, p_x) of a robot driving along the dipole at p, (...) rad.
+
+    Forwards behind the goal (p_x < 0), backwards ahead of it; in (−2π, 2π], without the jump by π
+    that the direction of motion makes at p_x = 0.
+    """
+    return 2 * np.arctan2(p[..., 1], p[..., 0])
+
+
 class VelocityField(Protocol):
     """Desired grasp velocity at each grasp position."""
 

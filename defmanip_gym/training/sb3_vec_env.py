@@ -31,7 +31,7 @@ class Sb3VecEnv(VecEnv):
         ParameterError: the environment resets in another way.
     """
 
-    def __init__(self, env: VectorEnv[Array, Array, Array]) -> None:
+    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
         if env.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
             raise ParameterError(
                 "autoreset_mode",
@@ -104,7 +104,9 @@ class Sb3VecEnv(VecEnv):
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
+        self,
+        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
+        indices: VecEnvIndices = None,
     ) -> list[bool]:
         """Whether episodes are wrapped; true of ``Monitor``, whose statistics are kept here."""
         from stable_baselines3.common.monitor import Monitor

@@ -1,0 +1,1 @@
+"""Learned controllers: portable actors, shipped agents, hyperparameters."""

@@ -1,0 +1,61 @@
+"""The command line, ``defmanip``; ``train.py`` and ``evaluate.py`` are single commands of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TypeVar
+
+import tyro
+from rich.console import Console
+
+from defmanip_gym.errors import DefmanipError
+from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
+from defmanip_gym.training.config import TrainConfig
+
+Config = TypeVar("Config")
+
+
+def main() -> None:
+    """Entry point of ``defmanip``."""
+    _guarded(
+        lambda: _run(
+            tyro.extras.subcommand_cli_from_dict(
+                {"train": _configured(TrainConfig), "compare": _configured(ComparisonConfig)},
+                description="Certified transport of deformable objects.",
+            )
+        )
+    )
+
+
+def train_main() -> None:
+    """Entry point of ``train.py``."""
+    _guarded(lambda: _run(tyro.cli(TrainConfig, prog="train.py")))
+
+
+def evaluate_main() -> None:
+    """Entry point of ``evaluate.py``."""
+    _guarded(lambda: _run(tyro.cli(ComparisonConfig, prog="evaluate.py")))
+
+
+def _configured(kind: type[Config]) -> type[Config]:
+    return kind
+
+
+def _run(config: object) -> None:
+    if isinstance(config, ComparisonConfig):
+        run_comparison(config)
+    elif isinstance(config, TrainConfig):
+        from defmanip_gym.training.train import train  # torch takes seconds to import
+
+        folder = train(config)
+        print(f"Run folder: {folder}")
+
+
+def _guarded(command: Callable[[], None]) -> None:
+    """Show this package's own errors as messages, without a traceback."""
+    try:
+        command()
+    except DefmanipError as error:
+        Console(stderr=True).print(f"[bold red]{type(error).__name__}[/]: {error}", highlight=False)
+        sys.exit(2)

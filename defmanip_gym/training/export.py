@@ -1,0 +1,58 @@
+"""From an SB3 model to a portable actor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from torch import nn
+
+from defmanip_gym.baselines.learned.actor import AgentCard, MlpActor
+from defmanip_gym.errors import AgentFileError
+
+_ACTIVATION_NAMES = {nn.Tanh: "tanh", nn.ReLU: "relu"}
+
+
+def actor_modules(model: BaseAlgorithm) -> tuple[list[nn.Module], bool]:
+    """Return the layers of a model's deterministic actor and whether tanh squashes its output.
+
+    Raises:
+        AgentFileError: an algorithm other than PPO, SAC and TD3.
+    """
+    policy: Any = model.policy
+    name = type(model).__name__
+    if name == "PPO":
+        return [*policy.mlp_extractor.policy_net, policy.action_net], False
+    if name == "SAC":
+        return [*policy.actor.latent_pi, policy.actor.mu], True
+    if name == "TD3":
+        return [*policy.actor.mu][:-1], True
+    raise AgentFileError("algorithm", name, "PPO, SAC or TD3", "Export knows these actors only.")
+
+
+def hidden_activation(model: BaseAlgorithm) -> str:
+    """Return the name of the hidden layers' activation.
+
+    Raises:
+        AgentFileError: neither tanh nor ReLU.
+    """
+    modules, _ = actor_modules(model)
+    kinds = {type(module) for module in modules} - {nn.Linear}
+    names = {_ACTIVATION_NAMES.get(kind, kind.__name__) for kind in kinds}
+    if len(names) != 1 or not names <= set(_ACTIVATION_NAMES.values()):
+        raise AgentFileError("activation", sorted(names), "tanh or relu", "Train with one of them.")
+    return names.pop()
+
+
+def to_actor(model: BaseAlgorithm, card: AgentCard, normalization: RunningMeanStd) -> MlpActor:
+    """Return the model's deterministic policy with its observation normalization."""
+    modules, _ = actor_modules(model)
+    linear = [module for module in modules if isinstance(module, nn.Linear)]
+    return MlpActor(
+        card,
+        weights=[layer.weight.detach().double().numpy().copy() for layer in linear],
+        biases=[layer.bias.detach().double().numpy().copy() for layer in linear],
+        observation_mean=normalization.mean.copy(),
+        observation_variance=normalization.var.copy(),
+    )

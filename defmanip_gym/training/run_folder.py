@@ -1,0 +1,142 @@
+"""A training run on disk: configuration, checkpoints, curves, exported agents."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from defmanip_gym.errors import RunFolderError
+from defmanip_gym.files import write_atomically
+from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.version import __version__
+
+_CONFIG = "config.json"
+_CHECKPOINTS = "checkpoints"
+_KEPT_CHECKPOINTS = 2
+
+
+class RunFolder:
+    """Paths and atomic writes of one run.
+
+    Args:
+        path: the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @staticmethod
+    def create(config: TrainConfig, hyperparameters: dict[str, Any], command: str) -> RunFolder:
+        """Make a folder whose name tells algorithm and seed, with its configuration inside.
+
+        Raises:
+            RunFolderError: the output folder cannot be written.
+        """
+        certificate = f"-{config.certificate}" if config.certificate else ""
+        name = f"{config.env.split(':')[-1]}-{config.algo}{certificate}-seed{config.seed}"
+        try:
+            config.output.mkdir(parents=True, exist_ok=True)
+            path = _first_free(config.output / name)
+            path.mkdir()
+            folder = RunFolder(path)
+            folder._write_config(config, hyperparameters, command)
+        except OSError as error:
+            raise RunFolderError(
+                "output", str(config.output), "a writable folder", f"{error}"
+            ) from error
+        return folder
+
+    def _write_config(
+        self, config: TrainConfig, hyperparameters: dict[str, Any], command: str
+    ) -> None:
+        content = {
+            "train": {key: _plain(value) for key, value in asdict(config).items()},
+            "hyperparameters": hyperparameters,
+            "command": command,
+            "package_version": __version__,
+            "git_revision": git_revision(),
+        }
+        write_atomically(self.path / _CONFIG, (json.dumps(content, indent=2) + "\n").encode())
+
+    def read_config(self) -> dict[str, Any]:
+        """Return what ``create`` wrote.
+
+        Raises:
+            RunFolderError: this is no run folder of this package.
+        """
+        try:
+            content = json.loads((self.path / _CONFIG).read_text())
+            return {"train": content["train"], **content}
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+            raise RunFolderError(
+                "resume", str(self.path), "a folder made by train.py", f"{_CONFIG}: {error}"
+            ) from error
+
+    def save_checkpoint(self, timesteps: int, write: Callable[[Path], None]) -> Path:
+        """Let ``write`` fill a folder that appears under its name only when complete."""
+        parent = self.path / _CHECKPOINTS
+        parent.mkdir(exist_ok=True)
+        target = parent / f"step-{timesteps:010d}"
+        temporary = Path(tempfile.mkdtemp(dir=parent, prefix=".writing-"))
+        try:
+            write(temporary)
+            if target.exists():
+                shutil.rmtree(target)
+            os.rename(temporary, target)
+        except BaseException:
+            shutil.rmtree(temporary, ignore_errors=True)
+            raise
+        for old in self._checkpoints()[:-_KEPT_CHECKPOINTS]:
+            shutil.rmtree(old)
+        return target
+
+    def last_checkpoint(self) -> Path:
+        """Return the newest complete checkpoint.
+
+        Raises:
+            RunFolderError: there is none.
+        """
+        checkpoints = self._checkpoints()
+        if not checkpoints:
+            raise RunFolderError(
+                "resume", str(self.path), "a run with a checkpoint", "Start the run anew."
+            )
+        return checkpoints[-1]
+
+    def _checkpoints(self) -> list[Path]:
+        return sorted((self.path / _CHECKPOINTS).glob("step-*"))
+
+
+def git_revision() -> str:
+    """Return the revision of the working tree that holds this package, or "unknown"."""
+    try:
+        answer = subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return answer.stdout.strip()
+
+
+def _first_free(path: Path) -> Path:
+    number, candidate = 1, path
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.name}-{number}")
+    return candidate
+
+
+def _plain(value: Any) -> Any:
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,234 @@
+"""ν_max as an action-scaling wrapper: no policy inside it can violate the certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import ActionError, CertificateError
+from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.theory.certificates import Certificate
+from defmanip_gym.theory.certified_command import certified_command
+from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+
+Array = NDArray[np.float64]
+
+# Commands closer than this to their bound count as respecting it.
+_ROUNDING_M_S2 = 1e-9
+
+
+class ActionScaling:
+    """Scales batches of normalized actions into a certificate and counts what it changed.
+
+    Args:
+        config: the environment's definition.
+        certificate: the bounds to enforce.
+
+    Raises:
+        CertificateError: the certificate does not fit the environment.
+    """
+
+    def __init__(self, config: TransportConfig, certificate: Certificate) -> None:
+        if config.control_mode != "task":
+            raise CertificateError(
+                "control_mode",
+                config.control_mode,
+                "'task'",
+                "A certificate bounds the task acceleration; make the environment in task mode.",
+            )
+        if certificate.beam.segment_count != config.beam.segment_count:
+            raise CertificateError(
+                "certificate.beam.segment_count",
+                certificate.beam.segment_count,
+                f"{config.beam.segment_count}, as in the environment",
+                "Compute the certificate for the environment's beam.",
+            )
+        if certificate.sigma_rad > config.sigma_rad:
+            raise CertificateError(
+                "certificate.sigma_rad",
+                certificate.sigma_rad,
+                f"at most the environment's {config.sigma_rad:.6g}",
+                "Certify with the environment's sigma_rad.",
+            )
+        self._config, self._certificate = config, certificate
+        self._layout = ObservationLayout(config.beam.segment_count)
+        self._kinematics = ArmKinematics(config.robot)
+        self.steps = 0
+        self.interventions = 0
+        self.total_intervention_m_s2 = 0.0
+
+    def applies(self, observation: Array) -> NDArray[np.bool_]:
+        """Whether episodes that start with these observations (n, size) meet the conditions."""
+        swing = np.abs(self._layout.part(observation, "swing")).max(axis=1)
+        return np.asarray(swing <= self._certificate.conditions.initial_swing_rad + 1e-12)
+
+    def scale(self, actions: Array, observation: Array) -> tuple[Array, Array]:
+        """Return certified actions (n, 3) and by how much w changed, (n,) m/s².
+
+        Args:
+            actions: normalized, (n, 3).
+            observation: what the environment last returned, (n, size).
+
+        Raises:
+            ActionError: actions that are not finite or of another shape.
+        """
+        task = self._config.task
+        if np.shape(actions) != (len(observation), 3) or not np.isfinite(actions).all():
+            raise ActionError(
+                "action", actions, f"finite numbers of shape {(len(observation), 3)}", "Check them."
+            )
+        pitch = self._layout.part(observation, "joints") @ JOINT_TO_PITCH.T
+        w = np.clip(actions, -1.0, 1.0) * task.max_acceleration_m_s2
+        certified = certified_command(
+            w,
+            self._layout.part(observation, "grasp_velocity_b"),
+            self._layout.part(observation, "base_velocity"),
+            self._kinematics.reach_and_height(pitch)[:, 0],
+            self._certificate,
+            max_speed=task.max_speed_m_s,
+            period_s=task.control_period_s,
+        )
+        change = np.sqrt(((certified - w) ** 2).sum(axis=1))
+        self.steps += len(change)
+        self.interventions += int((change > _ROUNDING_M_S2).sum())
+        self.total_intervention_m_s2 += float(change.sum())
+        return certified / task.max_acceleration_m_s2, change
+
+    @property
+    def intervention_rate(self) -> float:
+        """Share of steps whose action was changed."""
+        return self.interventions / max(self.steps, 1)
+
+
+class NuMaxActionScaling(
+    gymnasium.Wrapper[Array, Array, Array, Array], gymnasium.utils.RecordConstructorArgs
+):
+    """Keeps every action of a single environment within a certificate.
+
+    ``info`` gains ``intervened`` (bool), ``intervention_m_s2`` (change of w) and
+    ``certificate_applies`` (whether this episode's start meets the certificate's conditions);
+    ``scaling`` holds the running counts.
+
+    Args:
+        env: a DeformTransport environment in task mode.
+        certificate: the bounds to enforce.
+
+    Raises:
+        CertificateError: the certificate does not fit the environment.
+    """
+
+    def __init__(self, env: gymnasium.Env[Array, Array], certificate: Certificate) -> None:
+        gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=certificate)
+        super().__init__(env)
+        self.scaling = ActionScaling(transport_config(env), certificate)
+        self._observation: Array
+        self._applies = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._observation = observation
+        self._applies = bool(self.scaling.applies(observation[None])[0])
+        return observation, info | self._report(0.0)
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Step with the action scaled into the certificate."""
+        actions = np.asarray(action, dtype=np.float64)[None]
+        certified, change = self.scaling.scale(actions, self._observation[None])
+        observation, reward, terminated, truncated, info = self.env.step(certified[0])
+        self._observation = observation
+        return observation, float(reward), terminated, truncated, info | self._report(change[0])
+
+    def _report(self, change: float) -> dict[str, Any]:
+        return {
+            "intervened": bool(change > _ROUNDING_M_S2),
+            "intervention_m_s2": float(change),
+            "certificate_applies": self._applies,
+        }
+
+
+class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
+    """The same for a batch; every added info key holds an array over the episodes.
+
+    Args:
+        env: a batched DeformTransport environment in task mode.
+        certificate: the bounds to enforce.
+
+    Raises:
+        CertificateError: the certificate does not fit the environment.
+    """
+
+    def __init__(
+        self, env: gymnasium.vector.VectorEnv[Any, Any, Any], certificate: Certificate
+    ) -> None:
+        super().__init__(env)
+        self.scaling = ActionScaling(transport_config(env), certificate)
+        self._observation: Array
+        self._applies = np.zeros(env.num_envs, dtype=bool)
+        self._ended = np.zeros(env.num_envs, dtype=bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start episodes; all, or those of ``options["reset_mask"]``."""
+        mask = (options or {}).get("reset_mask")
+        observation, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
+        started = np.ones(self.num_envs, dtype=bool) if mask is None else np.asarray(mask)
+        self._remember(observation, started)
+        return observation, info | self._report(np.zeros(self.num_envs))
+
+    def step(
+        self, actions: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Step with the actions scaled into the certificate."""
+        certified, change = self.scaling.scale(
+            np.asarray(actions, dtype=np.float64), self._observation
+        )
+        observation, reward, terminated, truncated, info = self.env.step(certified)
+        report = self._report(change)
+        if "final_info" in info:
+            info["final_info"] |= report
+        ended = terminated | truncated
+        mode = self.env.metadata["autoreset_mode"]
+        if mode is AutoresetMode.NEXT_STEP:
+            started, self._ended = self._ended, ended
+        else:
+            started = ended if mode is AutoresetMode.SAME_STEP else np.zeros_like(ended)
+        self._remember(observation, started)
+        return observation, reward, terminated, truncated, info | self._report(change)
+
+    def _remember(self, observation: Array, started: NDArray[np.bool_]) -> None:
+        self._observation = observation
+        self._applies = np.where(started, self.scaling.applies(observation), self._applies)
+
+    def _report(self, change: Array) -> dict[str, Any]:
+        return {
+            "intervened": change > _ROUNDING_M_S2,
+            "intervention_m_s2": change,
+            "certificate_applies": self._applies.copy(),
+        }
+
+
+def transport_config(env: Any) -> TransportConfig:
+    """Return the definition of a (wrapped) transport environment.
+
+    Raises:
+        CertificateError: it is another kind of environment.
+    """
+    config = getattr(env.unwrapped, "config", None)
+    if not isinstance(config, TransportConfig):
+        raise CertificateError(
+            "env", env, "a DeformTransport environment", "Certificates bound its task acceleration."
+        )
+    return config

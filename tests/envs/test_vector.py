@@ -1,0 +1,150 @@
+"""The batch is the single environment n times, and resets as it declares."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.params import BeamParams, DisturbanceParams
+
+ENV_ID = "defmanip_gym:DeformTransport-v0"
+NOISE = DisturbanceParams(force_bias_n=0.05, force_sensor_noise_n=0.1)
+
+
+def make(count, **arguments):
+    return gymnasium.make_vec(ENV_ID, num_envs=count, **arguments)
+
+
+def actions(steps, count, size=3):
+    return np.random.default_rng(5).uniform(-1, 1, (steps, count, size))
+
+
+@pytest.mark.parametrize("count", [7, 64])
+@pytest.mark.parametrize(("control_mode", "segments"), [("task", 1), ("force", 1), ("task", 9)])
+def test_batch_and_single_environment_agree_bit_for_bit(count, control_mode, segments):
+    size = 3 if control_mode == "task" else 4
+    arguments = {
+        "disturbance": NOISE,
+        "constraint_mode": "cost",
+        "control_mode": control_mode,
+        "beam": BeamParams(segment_count=segments),
+    }
+    many = make(count, autoreset_mode="Disabled", num_threads=2, **arguments)
+    single = gymnasium.make(ENV_ID, **arguments)
+    observations, _ = many.reset(seed=40)
+    index = count // 2
+    observation, _ = single.reset(seed=40 + index)
+    assert np.array_equal(observations[index], observation)
+    for batch in 0.3 * actions(40, count, size):
+        observations, rewards, *_ = many.step(batch)
+        observation, reward, terminated, *_ = single.step(batch[index])
+        assert np.array_equal(observations[index], observation)
+        assert rewards[index] == reward
+        if terminated:
+            break
+
+
+def test_threads_do_not_change_trajectories():
+    one, two = (make(16, num_threads=threads) for threads in (1, 2))
+    for env in (one, two):
+        env.reset(seed=1)
+    for batch in actions(150, 16):
+        assert np.array_equal(one.step(batch)[0], two.step(batch)[0])
+
+
+def test_same_step_reset_hands_over_the_final_observation():
+    env = make(4, max_episode_steps=5)
+    reference = make(4, max_episode_steps=5, autoreset_mode="Disabled")
+    env.reset(seed=0), reference.reset(seed=0)
+    for step in range(5):
+        batch = np.full((4, 3), 0.1)
+        observation, _, terminated, truncated, info = env.step(batch)
+        expected, *_ = reference.step(batch)
+        if step < 4:
+            assert np.array_equal(observation, expected)
+    assert truncated.all() and not terminated.any()
+    assert np.array_equal(info["final_obs"], expected)
+    assert info["_final_obs"].all()
+    assert not np.array_equal(observation, expected)
+    assert np.abs(observation[:, 8]).max() == 0.0  # the new episodes start at rest
+
+
+def test_only_ended_episodes_are_reset():
+    env = make(2, constraint_mode="terminate")
+    env.reset(seed=3)
+    for _ in range(60):
+        observation, _, terminated, _, info = env.step(np.array([[1.0, 0, 0], [0.0, 0, 0]]))
+        if terminated.any():
+            break
+    assert terminated.tolist() == [True, False]
+    assert info["final_info"]["cost"].tolist() == [1.0, 0.0]
+    assert env.unwrapped.engine.steps.tolist()[0] == 0
+    assert env.unwrapped.engine.steps.tolist()[1] > 0
+
+
+def test_next_step_reset_ignores_the_action_after_an_end():
+    env = make(3, max_episode_steps=4, autoreset_mode=AutoresetMode.NEXT_STEP)
+    assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    env.reset(seed=0)
+    for _ in range(4):
+        *_, truncated, _ = env.step(np.zeros((3, 3)))
+    assert truncated.all()
+    observation, reward, terminated, truncated, _ = env.step(np.ones((3, 3)))
+    assert not terminated.any() and not truncated.any()
+    assert (reward == 0).all()
+    assert np.abs(observation[:, 5:8]).max() == 0.0
+    assert (env.unwrapped.engine.steps == 0).all()
+
+
+def test_disabled_reset_starts_the_masked_episodes_only():
+    env = make(3, autoreset_mode="Disabled")
+    env.reset(seed=0)
+    before, *_ = env.step(np.full((3, 3), 0.2))
+    mask = np.array([True, False, True])
+    after, _ = env.reset(options={"reset_mask": mask})
+    assert np.array_equal(after[1], before[1])
+    assert (after[[0, 2], 8] == 0).all()
+    assert env.unwrapped.engine.steps.tolist() == [0, 1, 0]
+
+
+def test_autoreset_continues_each_episodes_own_generator():
+    first, second = make(2, max_episode_steps=2), make(2, max_episode_steps=2)
+    rows = []
+    for env in (first, second):
+        env.reset(seed=9)
+        rows.append([env.step(np.zeros((2, 3)))[0] for _ in range(5)])
+    assert np.array_equal(rows[0], rows[1])
+    assert not np.array_equal(rows[0][1], rows[0][3])
+
+
+def test_info_keys_are_the_same_at_reset_and_every_step():
+    env = make(2, max_episode_steps=3)
+    _, info = env.reset(seed=0)
+    keys = set(info)
+    for _ in range(4):
+        *_, info = env.step(np.zeros((2, 3)))
+        assert keys == set(info) - {"final_obs", "_final_obs", "final_info", "_final_info"}
+        assert all(info[key].shape == (2,) for key in keys)
+
+
+def test_a_failed_simulation_ends_only_its_own_episode():
+    env = make(3, autoreset_mode="Disabled")
+    env.reset(seed=0)
+    env.unwrapped.engine.simulation._velocity[1] = 1e12
+    observation, reward, terminated, _, info = env.step(np.zeros((3, 3)))
+    assert terminated.tolist() == [False, True, False]
+    assert info["simulation_failed"].tolist() == [False, True, False]
+    assert np.isfinite(observation).all() and np.isfinite(reward).all()
+    env.reset(options={"reset_mask": np.array([False, True, False])})
+    *_, terminated, _, info = env.step(np.zeros((3, 3)))
+    assert not terminated.any()
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"), [("num_envs", 0), ("max_episode_steps", 0), ("num_threads", -1)]
+)
+def test_bad_counts_are_refused(argument, value):
+    arguments = {"num_envs": 2, argument: value}
+    with pytest.raises(ParameterError, match=argument):
+        gymnasium.make_vec(ENV_ID, **arguments)
