@@ -25,7 +25,12 @@ LAYERS = [
     {"cli"},
 ]
 # siblings that must not know each other
-STRANGERS = [("theory", "plant"), ("plant", "theory"), ("baselines", "plant"), ("evaluation", "plant")]
+STRANGERS = [
+    ("theory", "plant"),
+    ("plant", "theory"),
+    ("baselines", "plant"),
+    ("evaluation", "plant"),
+]
 
 
 def part_of(path):
@@ -42,7 +47,11 @@ def imports(path):
 
 
 def modules():
-    return [path for path in PACKAGE.rglob("*.py") if path.name != "__init__.py" or path.parent != PACKAGE]
+    return [
+        path
+        for path in PACKAGE.rglob("*.py")
+        if path.name != "__init__.py" or path.parent != PACKAGE
+    ]
 
 
 @pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -53,15 +53,11 @@ def test_sb3_accepts_the_environment():
     "disturbance",
     [
         DisturbanceParams(),
-        DisturbanceParams(
-            force_bias_n=0.05, force_sensor_noise_n=0.1, swing_sensor_noise_rad=0.01
-        ),
+        DisturbanceParams(force_bias_n=0.05, force_sensor_noise_n=0.1, swing_sensor_noise_rad=0.01),
     ],
 )
 def test_one_seed_gives_one_trajectory_bit_for_bit(disturbance):
-    first, second = (
-        rollout(gymnasium.make(ENV_ID, disturbance=disturbance))[0] for _ in range(2)
-    )
+    first, second = (rollout(gymnasium.make(ENV_ID, disturbance=disturbance))[0] for _ in range(2))
     for a, b in zip(first, second, strict=True):
         assert np.array_equal(a, b)
 
@@ -80,8 +76,10 @@ def test_documented_observation_table_matches_the_space(segments):
 
 
 def test_documentation_lists_every_field_in_order():
-    rows = re.findall(r"\| (\d+)(?:-(\d+))?\s+\| (\w+)\s+\| (.+?)\s+\| (.+?)\s+\|",
-                      DeformTransportEnv.__doc__.split("## Observation Space")[1].split("##")[0])
+    rows = re.findall(
+        r"\| (\d+)(?:-(\d+))?\s+\| (\w+)\s+\| (.+?)\s+\| (.+?)\s+\|",
+        DeformTransportEnv.__doc__.split("## Observation Space")[1].split("##")[0],
+    )
     layout = ObservationLayout(1)
     documented = [
         (int(first), int(last or first) + 1, name, meaning, unit)

@@ -1,0 +1,168 @@
+"""Training runs leave complete folders, go on where they stopped, and export what they learned."""
+
+import json
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+import yaml
+from stable_baselines3.common.callbacks import BaseCallback
+
+from defmanip_gym.baselines.learned.agents import load_agent
+from defmanip_gym.envs.registration import ENV_ID
+from defmanip_gym.errors import AgentFileError, ParameterError, RunFolderError
+from defmanip_gym.training import train as training
+from defmanip_gym.training.config import TrainConfig, load_hyperparameters
+
+SMALL = {
+    "ppo": {"n_envs": 4, "n_steps": 32, "batch_size": 64, "n_epochs": 1},
+    "sac": {"n_envs": 4, "learning_starts": 50, "gradient_steps": 1, "buffer_size": 1000},
+    "td3": {"n_envs": 4, "learning_starts": 50, "gradient_steps": 1, "buffer_size": 1000},
+}
+
+
+@pytest.fixture
+def config(tmp_path):
+    def make(algo="ppo", **changes):
+        hyperparameters = load_hyperparameters(None, algo) | SMALL[algo]
+        path = tmp_path / f"{algo}.yml"
+        path.write_text(yaml.safe_dump({ENV_ID: hyperparameters}))
+        defaults = dict(
+            algo=algo,
+            total_timesteps=512,
+            output=tmp_path / "runs",
+            hyperparameters=path,
+            evaluations=2,
+            evaluation_episodes=2,
+        )
+        return TrainConfig(**(defaults | changes))
+
+    return make
+
+
+def sb3_actions(folder, config, observations):
+    """The actions of the run's last SB3 model, normalized as in training."""
+    venv = training.make_training_env(config, 4)
+    model = training.build_model(
+        config, load_hyperparameters(config.hyperparameters, config.algo), venv
+    )
+    training.read_checkpoint(training.RunFolder(folder).last_checkpoint(), model, venv)
+    return model.predict(venv.normalize_obs(observations), deterministic=True)[0]
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "td3"])
+def test_exported_agent_acts_as_the_trained_model(algo, config):
+    settings = config(algo)
+    folder = training.train(settings)
+    env = gymnasium.make(f"defmanip_gym:{ENV_ID}")
+    observations = np.array([env.reset(seed=seed)[0] for seed in range(8)])
+    actions, _ = load_agent(folder).predict(observations)
+    assert actions == pytest.approx(sb3_actions(folder, settings, observations), abs=1e-5)
+    stored = json.loads((folder / "config.json").read_text())
+    assert stored["train"]["algo"] == algo and stored["git_revision"]
+    assert {path.name for path in folder.iterdir()} == {
+        "config.json",
+        "curves",
+        "checkpoints",
+        "agent.json",
+        "agent.safetensors",
+    }
+    assert (folder / "curves" / "progress.csv").stat().st_size > 0
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac"])
+def test_resumed_run_goes_on_from_its_checkpoint(algo, config):
+    folder = training.train(config(algo))
+    before = load_agent(folder).card.total_timesteps
+    again = training.train(TrainConfig(resume=folder, total_timesteps=1024))
+    assert again == folder
+    assert load_agent(folder).card.total_timesteps == 1024 > before
+
+
+def test_interrupted_run_keeps_its_state_and_says_how_to_go_on(config, monkeypatch, capsys):
+    class Interrupt(BaseCallback):
+        def __init__(self, *_):
+            super().__init__()
+
+        def _on_step(self):
+            if self.num_timesteps >= 256:
+                raise KeyboardInterrupt
+            return True
+
+    monkeypatch.setattr(training, "Periodically", Interrupt)
+    with pytest.raises(SystemExit) as exit_info:
+        training.train(config())
+    assert exit_info.value.code == 130
+    assert "--resume" in (message := capsys.readouterr().out)
+    folder = training.Path(message.split("--resume ")[1].strip())
+    assert load_agent(folder).card.total_timesteps == 256
+    monkeypatch.undo()
+    training.train(TrainConfig(resume=folder))
+    assert load_agent(folder).card.total_timesteps == 512
+
+
+def test_one_seed_trains_one_agent(config):
+    first, second = (load_agent(training.train(config())) for _ in range(2))
+    observation = np.linspace(-1, 1, first.observation_size)
+    assert np.array_equal(first.predict(observation)[0], second.predict(observation)[0])
+
+
+def test_training_under_a_certificate_is_recorded(config):
+    folder = training.train(config(certificate="l1"))
+    assert load_agent(folder).card.certificate == "l1"
+    assert "l1" in folder.name
+
+
+def test_half_written_checkpoints_never_appear(config, monkeypatch):
+    folder = training.RunFolder(config().output)
+    folder.path.mkdir()
+
+    def fail(path):
+        (path / "half").write_text("x")
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        folder.save_checkpoint(1, fail)
+    assert list((folder.path / "checkpoints").iterdir()) == []
+
+
+def test_bad_runs_are_refused_by_name(config, tmp_path):
+    with pytest.raises(RunFolderError, match=r"train\.py"):
+        training.train(TrainConfig(resume=tmp_path))
+    with pytest.raises(ParameterError, match="YAML"):
+        training.train(replace(config(), hyperparameters=tmp_path / "missing.yml"))
+    with pytest.raises(ParameterError, match="seed"):
+        TrainConfig(seed=1_000_000)
+    with pytest.raises(ParameterError, match="total_timesteps"):
+        TrainConfig(total_timesteps=0)
+    with pytest.raises(ParameterError, match="env"):
+        TrainConfig(env="CartPole-v1")
+
+
+def test_damaged_checkpoint_is_refused_by_name(config):
+    folder = training.train(config())
+    checkpoint = training.RunFolder(folder).last_checkpoint()
+    (checkpoint / "model.zip").write_bytes(b"nonsense")
+    with pytest.raises(RunFolderError, match="checkpoint"):
+        training.train(TrainConfig(resume=folder, total_timesteps=1024))
+
+
+def test_missing_damaged_and_foreign_agents_are_refused(config, tmp_path):
+    with pytest.raises(AgentFileError, match="Check the name"):
+        load_agent("no-such-agent")
+    with pytest.raises(AgentFileError, match="JSON"):
+        load_agent(tmp_path)
+    folder = training.train(config())
+    checkpoint = training.RunFolder(folder).last_checkpoint()
+    with pytest.raises(AgentFileError, match="run code"):
+        load_agent(checkpoint / "model.zip")
+    with pytest.raises(AgentFileError, match="19"):
+        load_agent(folder).predict(np.zeros(21))
+    tensors = folder / "agent.safetensors"
+    tensors.write_bytes(tensors.read_bytes()[:100])
+    with pytest.raises(AgentFileError, match="damaged"):
+        load_agent(folder)
+    (folder / "agent.json").write_text("{}")
+    with pytest.raises(AgentFileError, match="format"):
+        load_agent(folder)
