@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 from defmanip_gym.errors import ParameterError
 
 
+# Scale of near_offset_b. Networks see observations normalized by their spread, and centimetres
+# drown in a spread of metres.
+NEAR_OFFSET_SCALE_M = 0.5
+
+
 @dataclass(frozen=True)
 class ObservationField:
     """A named part of the observation."""
@@ -44,6 +49,7 @@ class ObservationLayout:
             ObservationField("swing", count, "rad", "φ of each segment, from the vertical"),
             ObservationField("swing_rate", count, "rad/s", "φ̇ of each segment"),
             ObservationField("grasp_force_b", 3, "N", "measured force on the object"),
+            ObservationField("near_offset_b", 3, "-", "tanh of goal_offset_b over 0.5 m"),
         )
 
     @cached_property

@@ -53,7 +53,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
     | 3   | elbow torque τ2              | -1  | 1   | 150 N·m |
 
     ## Observation Space
-    `Box(-inf, inf, (17 + 2 N,), float64)` for a beam of N segments; shown for N = 1.
+    `Box(-inf, inf, (20 + 2 N,), float64)` for a beam of N segments; shown for N = 1.
 
     | Num   | Name             | Observation                            | Unit       |
     | ----- | ---------------- | -------------------------------------- | ---------- |
@@ -66,6 +66,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
     | 14    | swing            | φ of each segment, from the vertical   | rad        |
     | 15    | swing_rate       | φ̇ of each segment                      | rad/s      |
     | 16-18 | grasp_force_b    | measured force on the object           | N          |
+    | 19-21 | near_offset_b    | tanh of goal_offset_b over 0.5 m       | -          |
 
     ## Rewards
     The sum of the terms below, each also in `info`; the first three are differences of potentials.

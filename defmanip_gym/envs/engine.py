@@ -18,7 +18,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.starts import check_starts, requested_starts, sample_start
 from defmanip_gym.envs.workspace import in_workspace
 from defmanip_gym.errors import ActionError
-from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
 from defmanip_gym.plant.simulation import PlantState, Simulation
 from defmanip_gym.theory.control_laws import limit_speed
 from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
@@ -308,6 +308,7 @@ class TransportEngine:
                 plant.swing,
                 plant.swing_rate,
                 plant.grasp_force_b,
+                np.tanh(now.goal_offset_b / NEAR_OFFSET_SCALE_M),
             ),
             axis=1,
         )

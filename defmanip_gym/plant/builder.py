@@ -13,6 +13,7 @@ from defmanip_gym.plant import names
 from defmanip_gym.plant.scene import (
     BEAM_COLOR,
     ROBOT_COLOR,
+    SMALLEST_DRAWN_RADIUS_M,
     WHEEL_COLOR,
     add_tracking_camera,
     dress,
@@ -129,7 +130,7 @@ def _add_beam(
             name=names.segment_geom(index),
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[0, 0, 0, 0, 0, -length],
-            size=[beam.radius_m, 0, 0],
+            size=[max(beam.radius_m, SMALLEST_DRAWN_RADIUS_M), 0, 0],
             rgba=BEAM_COLOR,
             mass=0,
         )

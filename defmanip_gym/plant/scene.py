@@ -11,6 +11,7 @@ ROBOT_COLOR = [0.22, 0.35, 0.48, 1.0]
 WHEEL_COLOR = [0.13, 0.14, 0.16, 1.0]
 BEAM_COLOR = [0.20, 0.65, 0.45, 1.0]
 LIMIT_COLOR = [0.88, 0.15, 0.12, 1.0]
+SMALLEST_DRAWN_RADIUS_M = 0.03  # thinner beams are hard to see
 GOAL_COLOR = [0.95, 0.65, 0.10, 0.55]
 
 
@@ -62,7 +63,10 @@ def dress(spec: mujoco.MjSpec, goal_position_m: tuple[float, float, float]) -> N
 def add_tracking_camera(base: mujoco.MjsBody) -> None:
     """Add the camera that follows the robot without turning with it."""
     camera = base.add_camera(
-        name=names.TRACKING_CAMERA, pos=[0.6, -2.9, 1.5], xyaxes=[1, 0, 0, 0, 0.22, 0.975], fovy=45
+        name=names.TRACKING_CAMERA,
+        pos=[0.45, -2.5, 1.35],
+        xyaxes=[1, 0, 0, 0, 0.24, 0.97],
+        fovy=42,
     )
     camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
 
@@ -92,5 +96,5 @@ def _add_goal(world: mujoco.MjsBody, position: tuple[float, float, float]) -> No
 def _add_cameras(world: mujoco.MjsBody) -> None:
     # over the middle of the way from the paper's start to the goal
     world.add_camera(
-        name=names.OVERVIEW_CAMERA, pos=[-4.0, -6.5, 9.0], xyaxes=[1, 0, 0, 0, 0.72, 0.69], fovy=60
+        name=names.OVERVIEW_CAMERA, pos=[-4.0, -5.0, 7.5], xyaxes=[1, 0, 0, 0, 0.75, 0.66], fovy=52
     )

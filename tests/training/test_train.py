@@ -157,7 +157,7 @@ def test_missing_damaged_and_foreign_agents_are_refused(config, tmp_path):
     checkpoint = training.RunFolder(folder).last_checkpoint()
     with pytest.raises(AgentFileError, match="run code"):
         load_agent(checkpoint / "model.zip")
-    with pytest.raises(AgentFileError, match="19"):
+    with pytest.raises(AgentFileError, match="22"):
         load_agent(folder).predict(np.zeros(21))
     tensors = folder / "agent.safetensors"
     tensors.write_bytes(tensors.read_bytes()[:100])

@@ -1,0 +1,44 @@
+"""Make the picture of the README: ``python docs/make_images.py`` writes docs/images/."""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from defmanip_gym.baselines.tanner import TannerController
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.engine import TransportEngine
+from defmanip_gym.envs.rendering import TransportRenderer
+from defmanip_gym.plant.names import TRACKING_CAMERA
+
+FOLDER = Path(__file__).parent / "images"
+
+
+def strip() -> Image.Image:
+    """Return the robot on its way, braking hard with the beam near its limit, and at the goal."""
+    engine = TransportEngine(TransportConfig(constraint_mode="cost"), num_envs=1)
+    renderer = TransportRenderer(engine, width=480, height=420, camera=TRACKING_CAMERA)
+    frames = []
+    engine.reset(options={"start": "paper"})
+    for _ in range(24):
+        engine.step(np.array([[0.9, 0.0, 0.0]]))
+    frames.append(renderer.render("rgb_array"))
+    engine.reset(options={"start": "paper"})
+    controller, state = TannerController(), None
+    observation, _ = engine.reset(options={"start": "paper"})
+    for step in range(900):
+        action, state = controller.predict(observation, state, np.array([step == 0]))
+        result = engine.step(action)
+        observation = result.observation
+        if step == 250:
+            frames.insert(0, renderer.render("rgb_array"))
+        if result.terminated[0]:
+            break
+    frames.append(renderer.render("rgb_array"))
+    renderer.close()
+    return Image.fromarray(np.concatenate(frames, axis=1))
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    strip().save(FOLDER / "plant.png", optimize=True)
