@@ -137,7 +137,7 @@ class RewardParams:
     """Weights of the reward terms; see the environment's documentation for their formulas."""
 
     distance_weight_per_m: float = 1.0
-    course_weight_per_rad: float = 2.0
+    course_weight_per_rad: float = 5.0
     closeness_weight: float = 2.0
     time_cost_per_step: float = 0.02
     effort_weight: float = 0.001
