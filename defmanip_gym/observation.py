@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from defmanip_gym.errors import ParameterError
 
-
 # Scale of near_offset_b. Networks see observations normalized by their spread, and centimetres
 # drown in a spread of metres.
 NEAR_OFFSET_SCALE_M = 0.5

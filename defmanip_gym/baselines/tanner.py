@@ -51,6 +51,7 @@ class TannerParams:
             more than 4/3 of the true value destabilizes a uniform rod.
         acceleration_bound: bound on u_o where no certificate gives one, m/s².
         yaw_rate_bound: where no certificate gives one, rad/s.
+        bound_share: share of the bounds that u_o uses, leaving the rest to the force loop.
         deceleration_share: share of the bound that the speed profile plans to brake with.
     """
 
@@ -63,6 +64,7 @@ class TannerParams:
     force_law_damping: float = 0.0
     acceleration_bound: float = 1.0
     yaw_rate_bound: float = 1.0
+    bound_share: float = 0.85
     deceleration_share: float = 0.5
 
     def __post_init__(self) -> None:
@@ -73,6 +75,7 @@ class TannerParams:
             "approach_rate",
             "acceleration_bound",
             "yaw_rate_bound",
+            "bound_share",
             "deceleration_share",
         ):
             require_positive(name, getattr(self, name))
@@ -133,7 +136,7 @@ class TannerController:
         u_o = saturated_tracking(
             velocity - self._with_gentle_turn(desired, part("joints")),
             self.params.tracking_gain,
-            self.bound,
+            self.params.bound_share * self.bound,
             desired_rate,
         )
         # Section IV: Δu_o compares the measured force with the one the last u_o called for
@@ -142,10 +145,12 @@ class TannerController:
         )
         advanced = error_integral + self.task.control_period_s * error
         w = force_loop(u_o, error, advanced, self.params.gains)
+        # only u_o is bounded by the certificate: the rest of w makes up for disturbances
+        limit = self.task.max_acceleration_m_s2
         error_integral = integrate_unless_saturated(
-            error_integral, error, w, self.bound, self.task.control_period_s
+            error_integral, error, w, np.full(3, limit), self.task.control_period_s
         )
-        action = np.clip(w, -self.bound, self.bound) / self.task.max_acceleration_m_s2
+        action = np.clip(w / limit, -1.0, 1.0)
         return action.reshape(*observation.shape[:-1], 3), (error_integral, u_o)
 
     def _desired_motion(

@@ -34,7 +34,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
     `control_mode="task"` (default): `Box(-1, 1, (3,), float64)`. The acceleration w of the grasp
     point, Eq. (29), over `task.max_acceleration_m_s2` (3 m/s²). A built-in feedback linearization
     with nominal parameters, Eq. (28), turns it into forces; a limiter keeps the grasp below
-    `task.max_speed_m_s` (2 m/s, to within 3 % while the beam swings hard) and never hinders braking.
+    `task.max_speed_m_s` (2 m/s, to within 3 % as the beam swings) and never hinders braking.
 
     | Num | Action                          | Min | Max | Unit    |
     | --- | ------------------------------- | --- | --- | ------- |

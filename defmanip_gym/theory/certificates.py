@@ -36,8 +36,7 @@ class CertificateConditions:
         vertical_acceleration_m_s2: |vertical grasp acceleration| stays below this.
         yaw_rate_rad_s: |u2| stays below this.
         initial_swing_rad: the beam starts straight and at rest, at most this far off the vertical.
-        acceleration_error_m_s2: the forward grasp acceleration follows its command this closely,
-            up to a part in phase with −φ̇, which only damps the swing.
+        acceleration_error_m_s2: forward acceleration stays this close to what it was meant to be.
         vertical_error_m_s2: the same for the vertical one.
     """
 
@@ -53,13 +52,13 @@ class CertificateConditions:
 
 
 # Room for the transport task: 0.43 m of lifting, one turn of some 70 degrees, sampled starts, and
-# what a 0.05 N bias, sampling and a damping unknown to the feedback linearization leave uncorrected.
+# what disturbances do within the control period in which they change.
 TRANSPORT_CONDITIONS = CertificateConditions(
-    vertical_acceleration_m_s2=0.08,
+    vertical_acceleration_m_s2=0.05,
     yaw_rate_rad_s=0.3,
     initial_swing_rad=0.05,
     acceleration_error_m_s2=0.01,
-    vertical_error_m_s2=0.05,
+    vertical_error_m_s2=0.01,
 )
 
 

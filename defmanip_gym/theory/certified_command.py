@@ -2,6 +2,8 @@
 
 The paper scales its gains by a function of the margin to ν_max; scaling the command itself does
 the same for any controller and is exact: nothing is given away while the bounds are respected.
+What deforms the object is the acceleration that results, so the bounds hold for the command plus
+the disturbance that the last period showed.
 """
 
 from __future__ import annotations
@@ -23,10 +25,11 @@ def certified_command(
     reach: Array,
     certificate: Certificate,
     *,
+    disturbance: Array,
     max_speed: float,
     period_s: float,
 ) -> Array:
-    """Return the command nearest to w on each axis that respects the certificate.
+    """Return the command nearest to w whose resulting acceleration respects the certificate.
 
     Forward and vertical acceleration excite the swing and are clipped to their bounds. Sideways
     acceleration only turns the base, so it is bounded through the yaw rate one period ahead.
@@ -38,10 +41,13 @@ def certified_command(
         base_velocity: (u1, u2), (..., 2).
         reach: ρ, (...) m.
         certificate: the bounds.
+        disturbance: by how much the acceleration exceeded its command in the last period,
+            (..., 3) m/s².
         max_speed: the environment's own speed limit, m/s.
         period_s: control period.
     """
-    limited = limit_speed(w, grasp_velocity, min(max_speed, certificate.speed_bound), period_s)
+    speed = min(max_speed, certificate.speed_bound)
+    limited = limit_speed(w + disturbance, grasp_velocity, speed, period_s)
     forward, upward = certificate.acceleration_bound, certificate.vertical_acceleration_bound
     u1, u2 = base_velocity[..., 0], base_velocity[..., 1]
     reach_rate = grasp_velocity[..., 0] - u1
@@ -53,7 +59,7 @@ def certified_command(
         reach * (-rate - u2) / period_s + centripetal,
         reach * (rate - u2) / period_s + centripetal,
     )
-    return np.stack(
+    resulting = np.stack(
         (
             np.clip(limited[..., 0], -forward, forward),
             leftward,
@@ -61,3 +67,4 @@ def certified_command(
         ),
         axis=-1,
     )
+    return resulting - disturbance

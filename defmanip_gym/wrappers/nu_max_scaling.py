@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -15,12 +17,39 @@ from defmanip_gym.errors import ActionError, CertificateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.certified_command import certified_command
+from defmanip_gym.theory.frames import base_to_world
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 
 Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
-# Commands closer than this to their bound count as respecting it.
-_ROUNDING_M_S2 = 1e-9
+# Differences below this (m/s², rad) are rounding.
+_ROUNDING = 1e-9
+
+
+@dataclass(kw_only=True)
+class _LastPeriod:
+    """Motion and command one control period ago, n episodes; ``known`` is False at their start."""
+
+    velocity: Array
+    heading: Array
+    command: Array
+    known: BoolArray
+
+    @staticmethod
+    def at_rest(count: int) -> _LastPeriod:
+        return _LastPeriod(
+            velocity=np.zeros((count, 3)),
+            heading=np.zeros(count),
+            command=np.zeros((count, 3)),
+            known=np.zeros(count, dtype=bool),
+        )
+
+    def disturbance(self, velocity: Array, heading: Array, period_s: float) -> Array:
+        """Return by how much the acceleration exceeded its command, (n, 3) m/s², base frame."""
+        before = base_to_world(self.velocity, self.heading - heading)
+        excess = (velocity - before) / period_s - self.command
+        return np.where(self.known[:, None], excess, 0.0)
 
 
 class ActionScaling:
@@ -59,14 +88,31 @@ class ActionScaling:
         self._config, self._certificate = config, certificate
         self._layout = ObservationLayout(config.beam.segment_count)
         self._kinematics = ArmKinematics(config.robot)
+        self._memory: _LastPeriod
         self.steps = 0
         self.interventions = 0
         self.total_intervention_m_s2 = 0.0
 
-    def applies(self, observation: Array) -> NDArray[np.bool_]:
-        """Whether episodes that start with these observations (n, size) meet the conditions."""
+    def begin(self, observation: Array, started: BoolArray) -> BoolArray:
+        """Forget the past of episodes that start; return whether the certificate covers these.
+
+        It does when the true beam is the certified one, with at least its damping, and starts
+        within the certified swing.
+
+        Args:
+            observation: first observations, (n, size); rows that do not start are not looked at.
+            started: which episodes start, (n,).
+        """
+        if not hasattr(self, "_memory"):
+            self._memory = _LastPeriod.at_rest(len(started))
+        self._memory.known[started] = False
+        beam, certified = self._config.beam, self._certificate.beam
+        same_beam = beam.damping >= certified.damping and certified == replace(
+            beam, damping=certified.damping
+        )
         swing = np.abs(self._layout.part(observation, "swing")).max(axis=1)
-        return np.asarray(swing <= self._certificate.conditions.initial_swing_rad + 1e-12)
+        limit = self._certificate.conditions.initial_swing_rad + _ROUNDING
+        return np.asarray(same_beam & (swing <= limit))
 
     def scale(self, actions: Array, observation: Array) -> tuple[Array, Array]:
         """Return certified actions (n, 3) and by how much w changed, (n,) m/s².
@@ -78,27 +124,37 @@ class ActionScaling:
         Raises:
             ActionError: actions that are not finite or of another shape.
         """
-        task = self._config.task
+        task, part = self._config.task, partial(self._layout.part, observation)
         if np.shape(actions) != (len(observation), 3) or not np.isfinite(actions).all():
             raise ActionError(
                 "action", actions, f"finite numbers of shape {(len(observation), 3)}", "Check them."
             )
-        pitch = self._layout.part(observation, "joints") @ JOINT_TO_PITCH.T
+        velocity = part("grasp_velocity_b")
+        heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
         w = np.clip(actions, -1.0, 1.0) * task.max_acceleration_m_s2
         certified = certified_command(
             w,
-            self._layout.part(observation, "grasp_velocity_b"),
-            self._layout.part(observation, "base_velocity"),
-            self._kinematics.reach_and_height(pitch)[:, 0],
+            velocity,
+            part("base_velocity"),
+            self._kinematics.reach_and_height(part("joints") @ JOINT_TO_PITCH.T)[:, 0],
             self._certificate,
+            disturbance=self._memory.disturbance(velocity, heading, task.control_period_s),
             max_speed=task.max_speed_m_s,
             period_s=task.control_period_s,
         )
+        limit = task.max_acceleration_m_s2
+        certified = np.clip(certified, -limit, limit)
+        self._memory = _LastPeriod(
+            velocity=velocity.copy(),
+            heading=heading,
+            command=certified,
+            known=np.ones(len(certified), dtype=bool),
+        )
         change = np.sqrt(((certified - w) ** 2).sum(axis=1))
         self.steps += len(change)
-        self.interventions += int((change > _ROUNDING_M_S2).sum())
+        self.interventions += int((change > _ROUNDING).sum())
         self.total_intervention_m_s2 += float(change.sum())
-        return certified / task.max_acceleration_m_s2, change
+        return certified / limit, change
 
     @property
     def intervention_rate(self) -> float:
@@ -112,7 +168,7 @@ class NuMaxActionScaling(
     """Keeps every action of a single environment within a certificate.
 
     ``info`` gains ``intervened`` (bool), ``intervention_m_s2`` (change of w) and
-    ``certificate_applies`` (whether this episode's start meets the certificate's conditions);
+    ``certificate_applies`` (whether the certificate covers this beam and this episode's start);
     ``scaling`` holds the running counts.
 
     Args:
@@ -136,7 +192,7 @@ class NuMaxActionScaling(
         """Start an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._observation = observation
-        self._applies = bool(self.scaling.applies(observation[None])[0])
+        self._applies = bool(self.scaling.begin(observation[None], np.array([True]))[0])
         return observation, info | self._report(0.0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -149,7 +205,7 @@ class NuMaxActionScaling(
 
     def _report(self, change: float) -> dict[str, Any]:
         return {
-            "intervened": bool(change > _ROUNDING_M_S2),
+            "intervened": bool(change > _ROUNDING),
             "intervention_m_s2": float(change),
             "certificate_applies": self._applies,
         }
@@ -210,11 +266,11 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
 
     def _remember(self, observation: Array, started: NDArray[np.bool_]) -> None:
         self._observation = observation
-        self._applies = np.where(started, self.scaling.applies(observation), self._applies)
+        self._applies = np.where(started, self.scaling.begin(observation, started), self._applies)
 
     def _report(self, change: Array) -> dict[str, Any]:
         return {
-            "intervened": change > _ROUNDING_M_S2,
+            "intervened": change > _ROUNDING,
             "intervention_m_s2": change,
             "certificate_applies": self._applies.copy(),
         }

@@ -6,7 +6,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from defmanip_gym.baselines.controller import RandomController
-from defmanip_gym.baselines.tanner import TannerController
+from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import (
@@ -87,7 +87,7 @@ def test_motion_stays_within_the_conditions():
 
 def test_a_controller_within_the_bounds_is_left_alone():
     env = batch()
-    controller = TannerController(certificate=L1)
+    controller = TannerController(certificate=L1, params=TannerParams(bound_share=0.7))
     observation, _ = env.reset(seed=0)
     state = None
     for k in range(200):
@@ -130,6 +130,23 @@ def test_single_and_batched_wrapper_agree_bit_for_bit():
         one, *_ = single.step(action)
         three, *_ = many.step(np.tile(action, (3, 1)))
     assert np.array_equal(one, three[1])
+
+
+def test_a_certificate_for_more_damping_than_there_is_is_flagged():
+    for damping, covered in ((0.1, True), (0.05, True), (1.0, False)):
+        certificate = certify(BeamParams(damping=damping), conditions=TRANSPORT_CONDITIONS)
+        _, info = NuMaxActionScaling(gymnasium.make(ENV_ID), certificate).reset(seed=0)
+        assert info["certificate_applies"] is covered
+
+
+def test_disturbances_larger_than_the_bound_are_countered():
+    certificate = certify(BeamParams(), method="tanner", conditions=TRANSPORT_CONDITIONS)
+    env = batch(certificate=certificate, disturbance=PAPER_DISTURBANCE)
+    observation, _ = env.reset(seed=0)
+    for _ in range(250):
+        observation, *_ = env.step(np.zeros((8, 3)))
+    speed = np.linalg.norm(observation[:, 5:8], axis=1).max()
+    assert speed < 5 * 0.02 * 0.05  # without: some 0.01 m/s² for 5 s
 
 
 def test_starts_outside_the_conditions_are_flagged():

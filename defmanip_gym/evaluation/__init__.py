@@ -1,0 +1,1 @@
+"""Paired comparison of controllers: rollouts to records, records to statistics and reports."""
