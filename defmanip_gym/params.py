@@ -39,6 +39,18 @@ def validated_sigma(sigma_rad: float) -> float:
     return float(sigma_rad)
 
 
+def _require_slender(name: str, radius_m: float, length_m: float) -> None:
+    """Raise ParameterError where no body has the inertias m l²/12, m l²/12, m r²/2."""
+    require_positive(name, radius_m, "m")
+    require_between(
+        name,
+        radius_m,
+        0.0,
+        length_m / math.sqrt(3),
+        remedy="Take a thinner or longer rod, or fewer segments; links are slender rods.",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinkParams:
     """A uniform arm link: a rod of length, mass and radius."""
@@ -50,7 +62,7 @@ class LinkParams:
     def __post_init__(self) -> None:
         require_positive("length_m", self.length_m, "m")
         require_positive("mass_kg", self.mass_kg, "kg")
-        require_positive("radius_m", self.radius_m, "m")
+        _require_slender("radius_m", self.radius_m, self.length_m)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +131,7 @@ class BeamParams:
         require_whole("segment_count", self.segment_count, 1)
         require_non_negative("joint_stiffness", self.joint_stiffness, "N m/rad")
         require_non_negative("joint_damping", self.joint_damping, "N m s/rad")
-        require_positive("radius_m", self.radius_m, "m")
+        _require_slender("radius_m", self.radius_m, self.segment_length_m)
 
     @property
     def segment_mass_kg(self) -> float:

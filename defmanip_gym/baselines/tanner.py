@@ -246,6 +246,7 @@ class TannerController:
             tracking_gain=self.params.tracking_gain,
             approach_rate=self.params.approach_rate,
             period_s=self.task.control_period_s,
+            feedforward=self.params.feedforward,
         )
         radius = loop.spectral_radius()
         if radius >= 1.0:

@@ -98,9 +98,7 @@ class RecordStore:
                 "The file is damaged: choose another output folder, or pass --fresh to discard it.",
             ) from error
 
-    def _insert(
-        self, records: dict[tuple[str, str], EpisodeRecord], record: EpisodeRecord
-    ) -> None:
+    def _insert(self, records: dict[tuple[str, str], EpisodeRecord], record: EpisodeRecord) -> None:
         key = record.contestant, record.scenario
         if key in records:
             raise RecordError(

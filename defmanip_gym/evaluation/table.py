@@ -143,9 +143,7 @@ COLUMNS = (
         unit="% of steps",
         value=lambda s: _percent(s.interventions),
         interval=lambda s: (
-            ""
-            if s.mean_intervention_m_s2 is None
-            else f"{s.mean_intervention_m_s2:.2g} m/s²"
+            "" if s.mean_intervention_m_s2 is None else f"{s.mean_intervention_m_s2:.2g} m/s²"
         ),
         legend="share of steps in which the ν_max wrapper changed the command, and the mean change "
         "over all steps; – without wrapper",

@@ -80,7 +80,9 @@ class Simulation:
         self._batch = batch.Batch(self.model, count, nthread=threads)
         self._position: Array = self._batch.bind("qpos")
         self._velocity: Array = self._batch.bind("qvel")
-        self._control: Array = self._batch.bind("ctrl")[:, : len(names.ACTUATORS)]
+        control: Array = self._batch.bind("ctrl")
+        self._control = control[:, : len(names.ACTUATORS)]
+        self._lateral_target = control[:, self.model.actuator(names.NO_SLIP).id]
         self._external: Array = self._batch.bind("xfrc_applied")
         self._force: Array = self._batch.bind("sensordata")
         self._forearm = self.model.body(names.FOREARM).id
@@ -151,6 +153,11 @@ class Simulation:
         A simulation that diverged holds a meaningless state until it is placed again.
         """
         failed = np.zeros(self.count, dtype=bool)
+        # the no-slip force acts along the axle at the start of a step, and the base has turned by
+        # u2 h at its end: without this lead it would slip by u1 u2 h, 5 mm/s at 1 m/s and 1 rad/s
+        heading, velocity = self._position[:, 2], self._velocity
+        forward = np.cos(heading) * velocity[:, 0] + np.sin(heading) * velocity[:, 1]
+        self._lateral_target[:] = forward * velocity[:, 2] * self.model.opt.timestep
         try:
             # the extra stage makes the force that of this instant, not of one substep ago
             self._batch.step(nstep=substeps, stage=_ACCELERATION_STAGE)

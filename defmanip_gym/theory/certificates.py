@@ -17,6 +17,7 @@ import numpy as np
 
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import BeamParams, validated_sigma
+from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.impulse_response import peak_free_response, peak_gains
 from defmanip_gym.theory.zero_dynamics import (
     LinearizedObject,
@@ -150,6 +151,12 @@ def nu_max_tanner(
     return float(deformation_budget_rad / (8 * linear.count**2 * largest * input_gain) * radical)
 
 
+def stiffness_gain(linear: LinearizedObject, perturbation: Array) -> Array:
+    """Return sup|z2_k| per unit of a stiffness perturbation and of ‖z2‖∞ ≤ σ, shape (N,)."""
+    C = np.eye(linear.count, 2 * linear.count)
+    return peak_gains(linear.A_u, perturbation, C).sum(axis=1)
+
+
 def _tanner(
     beam: BeamParams,
     linear: LinearizedObject,
@@ -160,10 +167,13 @@ def _tanner(
 ) -> Certificate:
     smallest, largest = np.linalg.eigvalsh(lyapunov_matrix(linear.A_u))[[0, -1]]
     start = conditions.initial_swing_rad * math.sqrt(linear.count * largest / smallest)
-    budget = sigma_rad - float(np.abs(equilibrium(beam)).max()) - start
+    # Eq. (16) is the motion without yaw; small gain adds what the centrifugal stiffness brings
+    turning = conditions.yaw_rate_rad_s**2 * stiffness_gain(linear, linear.centrifugal_stiffness)
+    rest = float(np.abs(equilibrium(beam)).max())
+    budget = sigma_rad * float(1.0 - turning.max()) - rest - start
     nu_max = nu_max_tanner(linear, budget, printed=printed)
     # Eq. (19) with s = sup‖ż1‖∞ = ν_max / 2, the paper's choice in Section VI
-    half = nu_max / 2
+    half = max(nu_max, 0.0) / 2
     return Certificate(
         method="tanner_printed" if printed else "tanner",
         is_proven=not printed,

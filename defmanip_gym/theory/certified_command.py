@@ -54,17 +54,36 @@ def certified_command(
     # leftward acceleration = ρ u̇2 + 2 ρ̇ u2 + u1 u2
     centripetal = 2 * reach_rate * u2 + u1 * u2
     rate = _YAW_RATE_SHARE * certificate.conditions.yaw_rate_rad_s
-    leftward = np.clip(
-        limited[..., 1],
-        reach * (-rate - u2) / period_s + centripetal,
-        reach * (rate - u2) / period_s + centripetal,
-    )
+    rightmost = reach * (-rate - u2) / period_s + centripetal
+    leftmost = reach * (rate - u2) / period_s + centripetal
     resulting = np.stack(
         (
             np.clip(limited[..., 0], -forward, forward),
-            leftward,
+            np.clip(limited[..., 1], rightmost, leftmost),
             np.clip(limited[..., 2], -upward, upward),
         ),
         axis=-1,
     )
-    return resulting - disturbance
+    coasting = np.zeros_like(resulting)
+    coasting[..., 1] = np.clip(0.0, rightmost, leftmost)
+    return _slowed(resulting - disturbance, coasting - disturbance, grasp_velocity, speed, period_s)
+
+
+def _slowed(
+    command: Array, coasting: Array, velocity: Array, limit: float, period_s: float
+) -> Array:
+    """Return the farthest point from ``coasting`` to ``command`` within the speed limit.
+
+    Clipping to the bounds may undo braking that the speed limit asked for; left to itself the
+    environment's limiter would then brake harder than certified.
+    """
+    start, change = velocity + period_s * coasting, period_s * (command - coasting)
+    allowed = np.maximum(limit**2, np.maximum(_square(velocity), _square(start)))
+    a, b, c = _square(change), (start * change).sum(-1), _square(start) - allowed
+    share = (np.sqrt(np.maximum(b**2 - a * c, 0.0)) - b) / np.where(a > 0, a, 1.0)
+    share = np.where(a > 0, np.clip(share, 0.0, 1.0), 1.0)
+    return coasting + share[..., None] * (command - coasting)
+
+
+def _square(vector: Array) -> Array:
+    return (vector**2).sum(-1)

@@ -20,7 +20,8 @@ def peak_gains(A: Array, B: Array, C: Array) -> Array:
     """Return ∫₀^∞ |C e^{At} B| dt elementwise: the exact peak-to-peak gains.
 
     |y_i(t)| ≤ Σ_j gain_ij · sup|u_j| for η̇ = A η + B u, y = C η from rest, and a bang-bang input
-    attains it. A trapezoidal sum; the tests hold it against the closed form of one hinge.
+    attains it. A trapezoidal sum falls short by (ω T)²/12 on a sine; rounded up by that much at the
+    fastest mode, so that bounds made of it stay bounds.
 
     Args:
         A: (k, k), Hurwitz.
@@ -34,7 +35,7 @@ def peak_gains(A: Array, B: Array, C: Array) -> Array:
     for period, response in _sampled_response(A, B, C):
         magnitude = np.abs(response)
         total += period * (magnitude.sum(axis=0) - 0.5 * (magnitude[0] + magnitude[-1]))
-    return total
+    return total * (1 + (2 * np.pi / _SAMPLES_PER_PERIOD) ** 2 / 12)
 
 
 def peak_free_response(A: Array, start: Array, C: Array) -> Array:

@@ -43,6 +43,7 @@ class SampledLoop:
         tracking_gain: ε of Eq. (20), 1/s.
         approach_rate: speed of the velocity field per distance near the goal, 1/s.
         period_s: control period.
+        feedforward: whether u_o includes the field's change along the motion, −approach_rate · v.
     """
 
     robot: RobotParams
@@ -54,6 +55,7 @@ class SampledLoop:
     tracking_gain: float
     approach_rate: float
     period_s: float
+    feedforward: bool = False
 
     def spectral_radius(self) -> float:
         """Return the largest |eigenvalue| over one sample; the loop is stable below 1."""
@@ -101,6 +103,8 @@ class SampledLoop:
             error = measured - u_o_before
             integral = integral + self.period_s * error
             u_o = -self.tracking_gain * (x[1] + self.approach_rate * x[0])
+            if self.feedforward:
+                u_o = u_o - self.approach_rate * x[1]
             held = u_o - self.gains.k1 * error - self.gains.k2 * integral - compensation @ x[2:]
             return np.concatenate((advance @ x + forced * held, (held, u_o, integral)))
 

@@ -31,9 +31,8 @@ from defmanip_gym.training.checkpoint import (
 )
 from defmanip_gym.training.config import TrainConfig, load_hyperparameters
 from defmanip_gym.training.export import hidden_activation, to_actor
-from defmanip_gym.training.run_folder import RunFolder, git_revision
+from defmanip_gym.training.run_folder import RunFolder
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
-from defmanip_gym.version import __version__
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 
 _ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
@@ -136,6 +135,7 @@ def export(
     folder: RunFolder, name: str, config: TrainConfig, model: BaseAlgorithm, venv: VecNormalize
 ) -> None:
     """Write the model's policy as a portable agent into the run folder."""
+    started = folder.read_config()  # as it was when the run began, not now
     card = AgentCard(
         env_id=ENV_ID,
         observation_size=int(np.prod(venv.observation_space.shape or ())),
@@ -143,11 +143,11 @@ def export(
         algorithm=config.algo,
         activation=hidden_activation(model),  # type: ignore[arg-type]
         squashed=config.algo != "ppo",
-        command=folder.read_config()["command"],
+        command=started["command"],
         seed=config.seed,
         total_timesteps=model.num_timesteps,
-        package_version=__version__,
-        git_revision=git_revision(),
+        package_version=started["package_version"],
+        git_revision=started["git_revision"],
         certificate=config.certificate,
     )
     to_actor(model, card, observation_statistics(venv)).save(folder.path / name)

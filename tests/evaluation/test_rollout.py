@@ -101,9 +101,7 @@ def test_the_analytic_controller_reaches_the_goal():
 def test_the_wrapper_intervenes_and_is_counted():
     certificate = certify(BeamParams(), conditions=TRANSPORT_CONDITIONS)
     full = Constant(1.0, 0.0, 0.0)
-    wrapped, traces = run(
-        full, comparison_scenarios(1), certificate=certificate, traced={"paper"}
-    )
+    wrapped, traces = run(full, comparison_scenarios(1), certificate=certificate, traced={"paper"})
     record = wrapped["paper"]
     assert record.interventions == 1.0 and record.certificate_applies
     assert record.mean_intervention_m_s2 > 2.0
