@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 from rich.console import Console
@@ -18,10 +19,12 @@ Config = TypeVar("Config")
 
 def main() -> None:
     """Entry point of ``defmanip``."""
+    commands: dict[str, Callable[..., Any]] = {"train": TrainConfig, "compare": ComparisonConfig}
     _guarded(
         lambda: _run(
             tyro.extras.subcommand_cli_from_dict(
-                {"train": _configured(TrainConfig), "compare": _configured(ComparisonConfig)},
+                commands,
+                prog="defmanip",
                 description="Certified transport of deformable objects.",
             )
         )
@@ -30,16 +33,17 @@ def main() -> None:
 
 def train_main() -> None:
     """Entry point of ``train.py``."""
-    _guarded(lambda: _run(tyro.cli(TrainConfig, prog="train.py")))
+    _guarded(lambda: _run(_parsed(TrainConfig, "train.py")))
 
 
 def evaluate_main() -> None:
     """Entry point of ``evaluate.py``."""
-    _guarded(lambda: _run(tyro.cli(ComparisonConfig, prog="evaluate.py")))
+    _guarded(lambda: _run(_parsed(ComparisonConfig, "evaluate.py")))
 
 
-def _configured(kind: type[Config]) -> type[Config]:
-    return kind
+def _parsed(kind: type[Config], program: str) -> Config:
+    """Return the options of a one-command program; its help shows the class's examples."""
+    return tyro.cli(kind, prog=program, description=inspect.getdoc(kind))
 
 
 def _run(config: object) -> None:

@@ -22,7 +22,7 @@ LAYERS = [
     {"baselines"},
     {"evaluation"},
     {"training"},
-    {"cli"},
+    {"cli", "__main__"},
 ]
 # siblings that must not know each other
 STRANGERS = [

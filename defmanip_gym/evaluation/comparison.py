@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 
 from rich.console import Console
@@ -19,7 +20,12 @@ from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.baselines.learned.agents import load_agent, shipped_agents
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import SHIPPED_AGENT, Contestant, default_contestants
+from defmanip_gym.evaluation.contestants import (
+    SHIPPED_AGENT,
+    Contestant,
+    agent_contestants,
+    default_contestants,
+)
 from defmanip_gym.evaluation.outputs import TRACE_FOLDER, print_results, write_outputs
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.rollout import rollout
@@ -47,8 +53,10 @@ def run_comparison(config: ComparisonConfig) -> Path:
         AgentFileError: the shipped agent takes part but cannot be loaded.
     """
     console = Console()
-    everyone = default_contestants(config.environment.beam, config.sigma_rad)
-    contestants = _selected(everyone, config)
+    beam, sigma_rad = config.environment.beam, config.sigma_rad
+    everyone = default_contestants(beam, sigma_rad)
+    guests = [agent_contestants(path, beam, sigma_rad) for path in config.agents]
+    contestants = (*_selected(everyone, config), *chain.from_iterable(guests))
     scenarios = comparison_scenarios(config.episodes)
     store = _open_store(config, _fingerprint(config, everyone, scenarios))
     try:

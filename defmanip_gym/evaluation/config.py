@@ -14,7 +14,15 @@ from defmanip_gym.validation import require_positive, require_whole
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonConfig:
-    """Compare controllers on the same starts; a second run goes on where the first stopped."""
+    """Compare controllers on the same starts; a second run goes on where the first stopped.
+
+    Examples:
+        python evaluate.py
+
+        python evaluate.py --contestants tanner/l1 ppo --episodes 100 --output results/long
+
+        python evaluate.py --agents runs/DeformTransport-v0-sac-seed0 --output results/mine
+    """
 
     output: Path = Path("results/compare")
     """Folder for records, table, plots and report."""
@@ -24,6 +32,8 @@ class ComparisonConfig:
     """Simulated seconds after which an episode times out."""
     contestants: tuple[str, ...] | None = None
     """Names of those who take part; all by default."""
+    agents: tuple[Path, ...] = ()
+    """Run folders or .safetensors files of further agents, run without and with the wrapper."""
     sigma_rad: float = math.pi / 6
     """Admissible swing σ."""
     damping: float = 0.1

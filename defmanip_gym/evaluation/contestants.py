@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
+from defmanip_gym.baselines.learned.agents import load_agent
 from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.params import DESIGN_DAMPING, BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
@@ -143,7 +145,35 @@ def default_contestants(beam: BeamParams, sigma_rad: float) -> tuple[Contestant,
     )
 
 
-def _shipped_agent(seeds: Sequence[int]) -> Controller:
-    from defmanip_gym.baselines.learned.agents import load_agent
+def agent_contestants(path: Path, beam: BeamParams, sigma_rad: float) -> tuple[Contestant, ...]:
+    """Return an agent of the user's, without and with the ν_max wrapper.
 
+    Its name ends in what it was trained for, so that records of a longer training stay apart.
+
+    Raises:
+        AgentFileError: the agent cannot be loaded.
+        CertificateError: σ or the beam leaves no room for a certificate.
+    """
+    agent = load_agent(path)
+    name = f"{path.resolve().stem}@{agent.card.total_timesteps}"
+    l1 = certify(beam, sigma_rad=sigma_rad, method="l1", conditions=TRANSPORT_CONDITIONS)
+    plain = Contestant(
+        name=name,
+        description=f"{agent.card.algorithm} agent made by `{agent.card.command}`.",
+        privileged="nothing; its training saw the true plant",
+        colour="#7a5195",
+        build=lambda seeds: agent,
+    )
+    wrapped = replace(
+        plain,
+        name=f"{name}/l1",
+        description="The same agent inside the ν_max wrapper with the l1 certificate.",
+        privileged="the wrapper knows the beam's parameters",
+        colour="#c77dba",
+        certificate=l1,
+    )
+    return plain, wrapped
+
+
+def _shipped_agent(seeds: Sequence[int]) -> Controller:
     return load_agent(SHIPPED_AGENT)

@@ -69,7 +69,8 @@ class Certificate:
 
     Attributes:
         method: key of the method in this module's table.
-        is_proven: False for ``tanner_printed``.
+        is_proven: whether a proof for the linearized object stands behind it; attacks on the
+            nonlinear one are in the tests.
         sigma_rad: σ of Eq. (9).
         beam: the object it was computed for.
         nu_max: the bound on sup‖ν‖∞ before it is shared between speed and acceleration, m/s².

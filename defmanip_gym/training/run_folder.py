@@ -43,10 +43,11 @@ class RunFolder:
         name = f"{config.env.split(':')[-1]}-{config.algo}{certificate}-seed{config.seed}"
         try:
             config.output.mkdir(parents=True, exist_ok=True)
-            path = _first_free(config.output / name)
-            path.mkdir()
-            folder = RunFolder(path)
-            folder._write_config(config, hyperparameters, command)
+            temporary = Path(tempfile.mkdtemp(dir=config.output, prefix=".creating-"))
+            temporary.chmod(0o755)
+            RunFolder(temporary)._write_config(config, hyperparameters, command)
+            folder = RunFolder(_first_free(config.output / name))
+            os.rename(temporary, folder.path)
         except OSError as error:
             raise RunFolderError(
                 "output", str(config.output), "a writable folder", f"{error}"

@@ -1,0 +1,50 @@
+"""The commands answer for themselves: help, wrong input, and no tracebacks."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(*words, cwd=ROOT):
+    return subprocess.run(
+        [sys.executable, *words], capture_output=True, text=True, cwd=cwd, timeout=300
+    )
+
+
+@pytest.mark.parametrize("script", ["train.py", "evaluate.py"])
+def test_help_describes_options_and_shows_examples(script):
+    answer = run(script, "--help")
+    assert answer.returncode == 0
+    assert "--seed" in answer.stdout or "--episodes" in answer.stdout
+    assert f"python {script}" in answer.stdout
+
+
+def test_defmanip_lists_its_commands():
+    answer = run("-m", "defmanip_gym", "--help")
+    assert answer.returncode == 0
+    assert "train" in answer.stdout and "compare" in answer.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("train.py", "--seed", "-1"), "seed"),
+        (("train.py", "--resume", "nowhere"), "train.py"),
+        (("train.py", "--algo", "dqn"), "ppo"),
+        (("evaluate.py", "--contestants", "nobody"), "tanner/l1"),
+        (("evaluate.py", "--sigma-rad", "2"), "1.0472"),
+        (("evaluate.py", "--agents", "nothing.safetensors"), "nothing.json"),
+        (("evaluate.py", "--damping", "-1"), "damping"),
+    ],
+)
+def test_wrong_input_gets_a_message_and_no_traceback(words, said, tmp_path):
+    output = ("--output", str(tmp_path / "out"))
+    answer = run(*words, *output)
+    assert answer.returncode == 2
+    assert said in answer.stderr + answer.stdout
+    assert "Traceback" not in answer.stderr
+    assert not list(tmp_path.rglob("*.jsonl"))
