@@ -6,7 +6,7 @@ Both Gymnasium faces (``deform_transport`` for one, ``vector`` for n) are thin l
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -15,16 +15,21 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs import task as transport
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.snapshot import (
+    Snapshot,
+    Surveyor,
+    add_sensor_noise,
+    clean_observation,
+    frozen,
+)
 from defmanip_gym.envs.starts import check_starts, requested_starts, sample_start
 from defmanip_gym.envs.workspace import in_workspace
 from defmanip_gym.errors import ActionError
-from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
+from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.simulation import PlantState, Simulation
 from defmanip_gym.theory.control_laws import limit_speed
 from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
-from defmanip_gym.theory.frames import base_to_world
 from defmanip_gym.theory.redundancy import RedundancyResolution
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -41,16 +46,6 @@ class StepResult:
     info: dict[str, Any]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Snapshot:
-    """The true state and what the task makes of it."""
-
-    plant: PlantState
-    grasp_velocity_b: Array
-    goal_offset_b: Array
-    task: transport.TaskState
-
-
 class TransportEngine:
     """Physics, inner control loop, observation, reward and episode ends for n episodes.
 
@@ -64,8 +59,7 @@ class TransportEngine:
         self.config, self.num_envs = config, num_envs
         self.layout = ObservationLayout(config.beam.segment_count)
         self.action_size = 3 if config.control_mode == "task" else 4
-        self._kinematics = ArmKinematics(config.robot)
-        self._goal_position = np.array(config.goal_position_m)
+        self._surveyor = Surveyor(config)
         self._force_limits = np.array(config.robot.force_limits)
         self._linearization = FeedbackLinearization(
             config.believed_robot,
@@ -84,7 +78,7 @@ class TransportEngine:
         )
         self._generators = [np.random.default_rng(None) for _ in range(num_envs)]
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._now: _Snapshot
+        self._now: Snapshot
 
     @property
     def steps(self) -> NDArray[np.int64]:
@@ -257,70 +251,17 @@ class TransportEngine:
         )
         return np.repeat(force[:, None], 3, axis=1)
 
-    def _snapshot(self, failed: BoolArray | None = None) -> _Snapshot:
+    def _snapshot(self, failed: BoolArray | None = None) -> Snapshot:
+        """Read the plant; failed simulations stay as they last were: finite and meaningful."""
         plant = self.simulation.read()
         if failed is not None and failed.any():
-            plant = _frozen(plant, self._now.plant, failed)
-        pitch, pitch_rate = plant.joints @ JOINT_TO_PITCH.T, plant.joint_rates @ JOINT_TO_PITCH.T
-        reach_and_height = self._kinematics.reach_and_height(pitch)
-        rates = (self._kinematics.jacobian(pitch) * pitch_rate[:, None, :]).sum(-1)
-        reach, u1, u2 = reach_and_height[:, 0], plant.base_velocity[:, 0], plant.base_velocity[:, 1]
-        velocity = np.stack((u1 + rates[:, 0], reach * u2, rates[:, 1]), axis=1)
-        heading = plant.base_pose[:, 2]
-        cos, sin = np.cos(heading), np.sin(heading)
-        to_goal_x = self._goal_position[0] - plant.base_pose[:, 0]
-        to_goal_y = self._goal_position[1] - plant.base_pose[:, 1]
-        offset = np.stack(
-            (
-                cos * to_goal_x + sin * to_goal_y - reach,
-                cos * to_goal_y - sin * to_goal_x,
-                self._goal_position[2] - reach_and_height[:, 1],
-            ),
-            axis=1,
-        )
-        heading_error = transport.wrapped(heading - self.config.task.goal[2])
-        position = -base_to_world(offset, heading_error)[:, :2]
-        state = transport.TaskState(
-            distance_m=np.sqrt((offset**2).sum(axis=1)),
-            height_error_m=offset[:, 2],
-            speed_m_s=np.sqrt((velocity**2).sum(axis=1)),
-            heading_error_rad=heading_error,
-            course_error_rad=transport.course_error(
-                position, heading_error, self.config.task.course_blend_radius_m
-            ),
-            largest_swing_rad=np.abs(plant.swing).max(axis=1),
-        )
-        return _Snapshot(plant=plant, grasp_velocity_b=velocity, goal_offset_b=offset, task=state)
+            plant = frozen(plant, self._now.plant, failed)
+        return self._surveyor.snapshot(plant)
 
     def _observation(self, ids: Ids) -> Array:
         """Return observations of all episodes, drawing sensor noise for ``ids`` only."""
-        now, plant = self._now, self._now.plant
-        error = now.task.heading_error_rad
-        observation = np.concatenate(
-            (
-                now.goal_offset_b,
-                np.sin(error)[:, None],
-                np.cos(error)[:, None],
-                now.grasp_velocity_b,
-                plant.base_velocity,
-                plant.joints,
-                plant.joint_rates,
-                plant.swing,
-                plant.swing_rate,
-                plant.grasp_force_b,
-                np.tanh(now.goal_offset_b / NEAR_OFFSET_SCALE_M),
-            ),
-            axis=1,
-        )
-        disturbance, parts = self.config.disturbance, self.layout.slices
-        for name, deviation in (
-            ("grasp_force_b", disturbance.force_sensor_noise_n),
-            ("swing", disturbance.swing_sensor_noise_rad),
-        ):
-            if deviation > 0:
-                part = observation[:, parts[name]]
-                for index in ids:
-                    part[index] += self._generators[index].normal(0.0, deviation, part.shape[1])
+        observation = clean_observation(self._now)
+        add_sensor_noise(observation, self.layout, self.config.disturbance, self._generators, ids)
         return observation
 
     def _info(
@@ -350,14 +291,3 @@ _REWARD_TERMS = (
     "reward_failure",
     "reward_deformation",
 )
-
-
-def _frozen(plant: PlantState, before: PlantState, failed: BoolArray) -> PlantState:
-    """Return the state with failed simulations kept as they last were: finite and meaningful."""
-    names = PlantState.__dataclass_fields__
-    changes = {}
-    for name in names:
-        value = getattr(plant, name).copy()
-        value[failed] = getattr(before, name)[failed]
-        changes[name] = value
-    return replace(plant, **changes)
