@@ -149,8 +149,8 @@ class RewardParams:
     """Weights of the reward terms; see the environment's documentation for their formulas."""
 
     distance_weight_per_m: float = 1.0
-    course_weight_per_rad: float = 5.0
-    closeness_weight: float = 2.0
+    course_weight_per_rad: float = 10.0
+    closeness_weight: float = 5.0
     time_cost_per_step: float = 0.02
     effort_weight: float = 0.001
     success_bonus: float = 10.0
@@ -199,7 +199,7 @@ class TaskParams:
     speed_tolerance_m_s: float = 0.05
     swing_tolerance_rad: float = 0.05
     heading_tolerance_rad: float = 0.2
-    course_blend_radius_m: float = 0.2
+    course_blend_radius_m: float = 0.3
     arena_radius_m: float = 20.0
     smallest_elbow_bend_rad: float = 0.15
     smallest_reach_m: float = 0.25

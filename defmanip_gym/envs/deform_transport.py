@@ -77,8 +77,8 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
     | Term               | Value (weights in `task.reward`)                                       |
     | ------------------ | ---------------------------------------------------------------------- |
     | reward_distance    | decrease of d, 1 per metre                                             |
-    | reward_course      | decrease of ψ, 5 per radian                                            |
-    | reward_closeness   | decrease of log(1 + e), times 2                                        |
+    | reward_course      | decrease of ψ, 10 per radian                                           |
+    | reward_closeness   | decrease of log(1 + e), times 5                                        |
     | reward_time        | -0.02 a step                                                           |
     | reward_effort      | -0.001 times the squared norm of the action                            |
     | reward_success     | +10 on success                                                         |
