@@ -60,6 +60,6 @@ def _require(name, value, condition, allowed: str, remedy: str = "Choose one ins
 
 def _is_finite_number(value: object) -> bool:
     try:
-        return math.isfinite(value)  # type: ignore[arg-type]
+        return not isinstance(value, bool) and math.isfinite(value)  # type: ignore[arg-type]
     except TypeError:
         return False

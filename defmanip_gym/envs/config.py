@@ -43,6 +43,19 @@ class TransportConfig:
     disturbance: DisturbanceParams = field(default_factory=DisturbanceParams)
 
     def __post_init__(self) -> None:
+        for name, kind, optional in (
+            ("robot", RobotParams, False),
+            ("beam", BeamParams, False),
+            ("nominal_robot", RobotParams, True),
+            ("nominal_beam", BeamParams, True),
+            ("task", TaskParams, False),
+            ("disturbance", DisturbanceParams, False),
+        ):
+            value = getattr(self, name)
+            if not (isinstance(value, kind) or (optional and value is None)):
+                raise ParameterError(
+                    name, value, f"a {kind.__name__}", f"Pass {name}={kind.__name__}(...)."
+                )
         require_choice("control_mode", self.control_mode, get_args(ControlMode))
         require_choice("constraint_mode", self.constraint_mode, get_args(ConstraintMode))
         validated_sigma(self.sigma_rad)

@@ -19,7 +19,7 @@ from defmanip_gym.validation import require_choice
 Array = NDArray[np.float64]
 
 
-class DeformTransportEnv(gymnasium.Env[Any, Any]):
+class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     """Carry a swinging or flexible beam to a goal without deforming it past σ.
 
     ## Description
@@ -113,7 +113,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
     | nominal_robot   | `None`           | robot of the feedback linearization; the true one      |
     | nominal_beam    | `None`           | its beam; the true one with no damping at the root     |
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
-    | disturbance     | none             | force sinusoid, force bias, sensor noise               |
+    | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
 
     ## Version History
     * v0: initial version.
@@ -128,13 +128,27 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
         control_mode: ControlMode = "task",
         constraint_mode: ConstraintMode = "terminate",
         sigma_rad: float = math.pi / 6,
-        robot: RobotParams | None = None,
-        beam: BeamParams | None = None,
+        robot: RobotParams = RobotParams(),
+        beam: BeamParams = BeamParams(),
         nominal_robot: RobotParams | None = None,
         nominal_beam: BeamParams | None = None,
-        task: TaskParams | None = None,
-        disturbance: DisturbanceParams | None = None,
+        task: TaskParams = TaskParams(),
+        disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
+        # copies and pickles are new environments with the same arguments
+        gymnasium.utils.EzPickle.__init__(
+            self,
+            render_mode=render_mode,
+            control_mode=control_mode,
+            constraint_mode=constraint_mode,
+            sigma_rad=sigma_rad,
+            robot=robot,
+            beam=beam,
+            nominal_robot=nominal_robot,
+            nominal_beam=nominal_beam,
+            task=task,
+            disturbance=disturbance,
+        )
         if render_mode is not None:
             require_choice("render_mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
@@ -142,12 +156,12 @@ class DeformTransportEnv(gymnasium.Env[Any, Any]):
             control_mode=control_mode,
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
-            robot=robot or RobotParams(),
-            beam=beam or BeamParams(),
+            robot=robot,
+            beam=beam,
             nominal_robot=nominal_robot,
             nominal_beam=nominal_beam,
-            task=task or TaskParams(),
-            disturbance=disturbance or DisturbanceParams(),
+            task=task,
+            disturbance=disturbance,
         )
         self.engine = TransportEngine(self.config, num_envs=1)
         self.observation_space = observation_space(self.engine)

@@ -67,12 +67,12 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         control_mode: ControlMode = "task",
         constraint_mode: ConstraintMode = "terminate",
         sigma_rad: float = math.pi / 6,
-        robot: RobotParams | None = None,
-        beam: BeamParams | None = None,
+        robot: RobotParams = RobotParams(),
+        beam: BeamParams = BeamParams(),
         nominal_robot: RobotParams | None = None,
         nominal_beam: BeamParams | None = None,
-        task: TaskParams | None = None,
-        disturbance: DisturbanceParams | None = None,
+        task: TaskParams = TaskParams(),
+        disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
         require_whole("num_envs", num_envs, 1)
         require_whole("max_episode_steps", max_episode_steps, 1)
@@ -87,12 +87,12 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             control_mode=control_mode,
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
-            robot=robot or RobotParams(),
-            beam=beam or BeamParams(),
+            robot=robot,
+            beam=beam,
             nominal_robot=nominal_robot,
             nominal_beam=nominal_beam,
-            task=task or TaskParams(),
-            disturbance=disturbance or DisturbanceParams(),
+            task=task,
+            disturbance=disturbance,
         )
         self.engine = TransportEngine(self.config, num_envs, num_threads)
         self.single_observation_space = observation_space(self.engine)

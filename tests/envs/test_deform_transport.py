@@ -1,5 +1,7 @@
 """The single environment behaves as its documentation says."""
 
+import copy
+import pickle
 import re
 
 import gymnasium
@@ -218,6 +220,10 @@ def test_bad_actions_are_refused_by_name(action):
         ("sigma_rad", 1.2),
         ("sigma_rad", float("nan")),
         ("nominal_beam", BeamParams(segment_count=2)),
+        ("beam", "steel"),
+        ("task", {}),
+        ("disturbance", 0.05),
+        ("nominal_robot", 1),
     ],
 )
 def test_bad_arguments_are_refused_by_name(argument, value):
@@ -244,6 +250,13 @@ def test_bad_starts_are_refused_and_leave_the_episode_as_it_was(options):
     with pytest.raises(StartError, match="allowed"):
         env.reset(options=options)
     assert np.array_equal(before, env.unwrapped.engine.plant_state.base_pose)
+
+
+def test_copies_and_pickles_are_equal_environments():
+    env = DeformTransportEnv(beam=BeamParams(damping=0.3))
+    for other in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+        assert other.config == env.config
+        assert np.array_equal(other.reset(seed=1)[0], env.reset(seed=1)[0])
 
 
 def test_success_needs_all_four_tolerances():
