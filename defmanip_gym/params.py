@@ -13,6 +13,7 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import (
     require_between,
     require_finite_sequence,
+    require_instance,
     require_non_negative,
     require_positive,
     require_whole,
@@ -84,6 +85,8 @@ class RobotParams:
     elbow_torque_limit_nm: float = 150.0
 
     def __post_init__(self) -> None:
+        require_instance("upper_arm", self.upper_arm, LinkParams)
+        require_instance("forearm", self.forearm, LinkParams)
         require_positive("base_mass_kg", self.base_mass_kg, "kg")
         require_positive("base_yaw_inertia_kgm2", self.base_yaw_inertia_kgm2, "kg m²")
         require_positive("shoulder_height_m", self.shoulder_height_m, "m")
@@ -210,6 +213,8 @@ class TaskParams:
 
     def __post_init__(self) -> None:
         require_finite_sequence("goal", self.goal, 6)
+        require_instance("start", self.start, StartParams)
+        require_instance("reward", self.reward, RewardParams)
         for name, unit in (
             ("max_acceleration_m_s2", "m/s²"),
             ("max_speed_m_s", "m/s"),

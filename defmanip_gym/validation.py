@@ -7,10 +7,14 @@ from collections.abc import Collection, Sequence
 
 from defmanip_gym.errors import InvalidValueError, ParameterError
 
+# No mass, length or gain of a robot is beyond this; far beyond it arithmetic overflows.
+_LARGEST = 1e6
+
 
 def require_positive(name: str, value: float, unit: str = "") -> None:
     """Raise ParameterError unless ``value`` is a finite number above zero."""
-    _require(name, value, lambda number: number > 0, f"a finite number > 0 {unit}".rstrip())
+    allowed = f"a finite number > 0 and < {_LARGEST:g} {unit}".rstrip()
+    _require(name, value, lambda number: 0 < number < _LARGEST, allowed)
 
 
 def require_non_negative(name: str, value: float, unit: str = "") -> None:
@@ -35,9 +39,18 @@ def require_whole(name: str, value: int, low: int) -> None:
 
 def require_finite_sequence(name: str, values: Sequence[float], length: int) -> None:
     """Raise ParameterError unless ``values`` holds ``length`` finite numbers."""
-    if len(values) != length or not all(_is_finite_number(value) for value in values):
+    is_sequence = isinstance(values, Sequence) and not isinstance(values, str)
+    if not is_sequence or len(values) != length or not all(map(_is_finite_number, values)):
         raise ParameterError(
             name, values, f"{length} finite numbers", "Check their count and values."
+        )
+
+
+def require_instance(name: str, value: object, kind: type) -> None:
+    """Raise ParameterError unless ``value`` is an instance of ``kind``."""
+    if not isinstance(value, kind):
+        raise ParameterError(
+            name, value, f"a {kind.__name__}", f"Pass {name}={kind.__name__}(...)."
         )
 
 
@@ -61,5 +74,5 @@ def _require(name, value, condition, allowed: str, remedy: str = "Choose one ins
 def _is_finite_number(value: object) -> bool:
     try:
         return not isinstance(value, bool) and math.isfinite(value)  # type: ignore[arg-type]
-    except TypeError:
+    except (TypeError, OverflowError):
         return False

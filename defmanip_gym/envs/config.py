@@ -17,7 +17,7 @@ from defmanip_gym.params import (
     validated_sigma,
 )
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.validation import require_choice
+from defmanip_gym.validation import require_choice, require_instance
 
 ControlMode = Literal["task", "force"]
 ConstraintMode = Literal["terminate", "penalty", "cost"]
@@ -51,14 +51,18 @@ class TransportConfig:
             ("task", TaskParams, False),
             ("disturbance", DisturbanceParams, False),
         ):
-            value = getattr(self, name)
-            if not (isinstance(value, kind) or (optional and value is None)):
-                raise ParameterError(
-                    name, value, f"a {kind.__name__}", f"Pass {name}={kind.__name__}(...)."
-                )
+            if not (optional and getattr(self, name) is None):
+                require_instance(name, getattr(self, name), kind)
         require_choice("control_mode", self.control_mode, get_args(ControlMode))
         require_choice("constraint_mode", self.constraint_mode, get_args(ConstraintMode))
         validated_sigma(self.sigma_rad)
+        if self.task.start.largest_swing_rad > self.sigma_rad:
+            raise ParameterError(
+                "task.start",
+                self.task.start,
+                f"|φ| <= σ = {self.sigma_rad:.4g} rad at every sampled start",
+                "Narrow its spread or raise sigma_rad.",
+            )
         nominal = self.nominal_beam
         if nominal is not None and nominal.segment_count != self.beam.segment_count:
             raise ParameterError(

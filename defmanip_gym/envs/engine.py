@@ -11,6 +11,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from defmanip_gym.envs import task as transport
@@ -22,7 +23,7 @@ from defmanip_gym.envs.snapshot import (
     clean_observation,
     frozen,
 )
-from defmanip_gym.envs.starts import check_starts, requested_starts, sample_start
+from defmanip_gym.envs.starts import check_starts, extreme_starts, requested_starts, sample_start
 from defmanip_gym.envs.workspace import in_workspace
 from defmanip_gym.errors import ActionError
 from defmanip_gym.observation import ObservationLayout
@@ -56,6 +57,7 @@ class TransportEngine:
     """
 
     def __init__(self, config: TransportConfig, num_envs: int, num_threads: int = 0) -> None:
+        check_starts(extreme_starts(config.task.start), config)
         self.config, self.num_envs = config, num_envs
         self.layout = ObservationLayout(config.beam.segment_count)
         self.action_size = 3 if config.control_mode == "task" else 4
@@ -154,8 +156,11 @@ class TransportEngine:
 
         Raises:
             ActionError: wrong shape or values that are not finite.
+            ResetNeeded: no episode has been started.
         """
         config, task = self.config, self.config.task
+        if not hasattr(self, "_now"):
+            raise ResetNeeded("Call reset() before the first step().")
         actions = self._checked(actions)
         self.simulation.apply(self._generalized_forces(actions))
         if config.disturbance.has_force:

@@ -61,6 +61,10 @@ class TransportRenderer:
         self._model.geom_rgba[self._segments] = swing_color(swing, engine.config.sigma_rad)
         if mode != "human":
             _choose_headless_backend()
+        elif not _has_display():
+            raise RenderingError(
+                "Cannot open a window: there is no display. Use render_mode='rgb_array'."
+            )
         try:
             image = self._renderer.render(mode)
         except Exception as error:  # GL back ends raise whatever they like
@@ -77,6 +81,10 @@ class TransportRenderer:
 
 def _choose_headless_backend() -> None:
     """Name EGL where there is no display: Gymnasium tries GLFW first, which then fails late."""
-    displays = ("DISPLAY", "WAYLAND_DISPLAY")
-    if sys.platform == "linux" and not any(os.environ.get(name) for name in displays):
+    if not _has_display():
         os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+def _has_display() -> bool:
+    displays = ("DISPLAY", "WAYLAND_DISPLAY")
+    return sys.platform != "linux" or any(os.environ.get(name) for name in displays)

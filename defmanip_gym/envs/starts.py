@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from defmanip_gym.errors import StartError
 from defmanip_gym.params import StartParams
 
 Array = NDArray[np.float64]
+
+_LARGEST_HEADING_RAD = 100.0  # more turns than that are a slip of the pen
 
 PAPER_START = StartParams().center
 _ALLOWED = "'sampled', 'paper', or (x, y, θ, q1, q2, φ)"
@@ -52,9 +55,16 @@ def sample_start(params: StartParams, generator: np.random.Generator) -> Array:
     return np.array(params.center) + np.array(params.spread) * generator.uniform(-1.0, 1.0, 6)
 
 
+def extreme_starts(params: StartParams) -> Array:
+    """Return the corners of the sampled region, (64, 6)."""
+    signs = np.array(list(product((-1.0, 1.0), repeat=6)))
+    return np.array(params.center) + signs * np.array(params.spread)
+
+
 def check_starts(starts: Array, config: TransportConfig) -> None:
     """Raise StartError unless every start (k, 6) lies in the workspace and within σ."""
     inside = in_workspace(starts[:, :3], starts[:, 3:5], config)
+    inside &= np.abs(starts[:, 2]) < _LARGEST_HEADING_RAD
     within = np.abs(starts[:, 5]) <= config.sigma_rad
     for start, reachable, straight in zip(starts, inside, within, strict=True):
         if not reachable:

@@ -17,6 +17,7 @@ from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
+from defmanip_gym.errors import StartError
 from defmanip_gym.params import BeamParams, DisturbanceParams, RobotParams, TaskParams
 from defmanip_gym.validation import require_choice, require_whole
 
@@ -81,6 +82,8 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             require_choice("render_mode", render_mode, RENDER_MODES[1:])
         self.num_envs, self.render_mode = num_envs, render_mode
         self.max_episode_steps = max_episode_steps
+        if not isinstance(autoreset_mode, AutoresetMode):
+            require_choice("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
         self.config = TransportConfig(
@@ -113,14 +116,21 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         Args:
             seed: episode i gets ``seed + i``; or a seed for each of the n.
             options: ``start`` as in the single environment, or (n, 6) of them; ``reset_mask``.
+
+        Raises:
+            StartError: bad options, or seeds of another number than n.
         """
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
-        ids = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
+        ids = np.arange(self.num_envs) if mask is None else self._masked(mask)
         if seed is None or isinstance(seed, int | np.integer):
             seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
         else:
             seeds = list(seed)
+            if len(seeds) != self.num_envs:
+                raise StartError(
+                    "seed", seed, f"a number or {self.num_envs} of them", "Give one per episode."
+                )
         observation, info = self.engine.reset(ids, seeds=[seeds[i] for i in ids], options=options)
         self._ended[ids] = False
         return observation, info
@@ -148,6 +158,17 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             }
             self._ended = np.zeros(self.num_envs, dtype=bool)
         return observation, result.reward, result.terminated, truncated, info
+
+    def _masked(self, mask: Any) -> NDArray[np.intp]:
+        values = np.asarray(mask)
+        if values.shape != (self.num_envs,) or values.dtype != bool or not values.any():
+            raise StartError(
+                "reset_mask",
+                mask,
+                f"{self.num_envs} booleans, at least one of them True",
+                "Mark the episodes to start.",
+            )
+        return np.flatnonzero(values)
 
     def _step_after_reset(
         self, actions: Array

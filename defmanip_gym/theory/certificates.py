@@ -26,7 +26,7 @@ from defmanip_gym.theory.zero_dynamics import (
     linearize,
     lyapunov_matrix,
 )
-from defmanip_gym.validation import require_choice, require_non_negative
+from defmanip_gym.validation import require_choice, require_instance, require_non_negative
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,6 +114,7 @@ def certify(
         CertificateError: unknown method, an undamped object, or conditions that leave no room.
         ParameterError: σ out of range.
     """
+    require_instance("beam", beam, BeamParams)
     validated_sigma(sigma_rad)
     require_choice("method", method, tuple(_METHODS), CertificateError)
     conditions = conditions or CertificateConditions()

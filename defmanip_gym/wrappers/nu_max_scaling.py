@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
@@ -22,6 +23,8 @@ from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+
+_OBSERVATION_WRAPPERS = (gymnasium.ObservationWrapper, gymnasium.vector.VectorObservationWrapper)
 
 # Differences below this (m/s², rad) are rounding.
 _ROUNDING = 1e-9
@@ -125,10 +128,7 @@ class ActionScaling:
             ActionError: actions that are not finite or of another shape.
         """
         task, part = self._config.task, partial(self._layout.part, observation)
-        if np.shape(actions) != (len(observation), 3) or not np.isfinite(actions).all():
-            raise ActionError(
-                "action", actions, f"finite numbers of shape {(len(observation), 3)}", "Check them."
-            )
+        actions = _finite_numbers(actions, (len(observation), 3))
         velocity = part("grasp_velocity_b")
         heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
         w = np.clip(actions, -1.0, 1.0) * task.max_acceleration_m_s2
@@ -183,7 +183,7 @@ class NuMaxActionScaling(
         gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=certificate)
         super().__init__(env)
         self.scaling = ActionScaling(transport_config(env), certificate)
-        self._observation: Array
+        self._observation: Array | None = None
         self._applies = False
 
     def reset(
@@ -197,8 +197,9 @@ class NuMaxActionScaling(
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Step with the action scaled into the certificate."""
-        actions = np.asarray(action, dtype=np.float64)[None]
-        certified, change = self.scaling.scale(actions, self._observation[None])
+        if self._observation is None:
+            raise ResetNeeded("Call reset() before the first step().")
+        certified, change = self.scaling.scale(np.expand_dims(action, 0), self._observation[None])
         observation, reward, terminated, truncated, info = self.env.step(certified[0])
         self._observation = observation
         return observation, float(reward), terminated, truncated, info | self._report(change[0])
@@ -227,7 +228,7 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
     ) -> None:
         super().__init__(env)
         self.scaling = ActionScaling(transport_config(env), certificate)
-        self._observation: Array
+        self._observation: Array | None = None
         self._applies = np.zeros(env.num_envs, dtype=bool)
         self._ended = np.zeros(env.num_envs, dtype=bool)
 
@@ -248,9 +249,9 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         self, actions: Array
     ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Step with the actions scaled into the certificate."""
-        certified, change = self.scaling.scale(
-            np.asarray(actions, dtype=np.float64), self._observation
-        )
+        if self._observation is None:
+            raise ResetNeeded("Call reset() before the first step().")
+        certified, change = self.scaling.scale(actions, self._observation)
         observation, reward, terminated, truncated, info = self.env.step(certified)
         report = self._report(change)
         if "final_info" in info:
@@ -276,12 +277,32 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         }
 
 
+def _finite_numbers(actions: Any, shape: tuple[int, int]) -> Array:
+    try:
+        values = np.asarray(actions, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != shape or not np.isfinite(values).all():
+        raise ActionError("action", actions, f"finite numbers of shape {shape}", "Check them.")
+    return values
+
+
 def transport_config(env: Any) -> TransportConfig:
     """Return the definition of a (wrapped) transport environment.
 
     Raises:
         CertificateError: it is another kind of environment.
     """
+    layer = env
+    while layer is not env.unwrapped:
+        if isinstance(layer, _OBSERVATION_WRAPPERS):
+            raise CertificateError(
+                "env",
+                layer,
+                "an environment whose observations are as it made them",
+                "Put observation wrappers around NuMaxActionScaling, not inside it.",
+            )
+        layer = layer.env
     config = getattr(env.unwrapped, "config", None)
     if not isinstance(config, TransportConfig):
         raise CertificateError(
