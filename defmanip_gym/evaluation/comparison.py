@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 
+from filelock import FileLock, Timeout
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -56,20 +58,42 @@ def run_comparison(config: ComparisonConfig) -> Path:
     beam, sigma_rad = config.environment.beam, config.sigma_rad
     everyone = default_contestants(beam, sigma_rad)
     guests = [agent_contestants(path, beam, sigma_rad) for path in config.agents]
-    contestants = (*_selected(everyone, config), *chain.from_iterable(guests))
+    by_name = {c.name: c for c in (*_selected(everyone, config), *chain.from_iterable(guests))}
+    contestants = tuple(by_name.values())  # an agent named twice takes part once
     scenarios = comparison_scenarios(config.episodes)
-    store = _open_store(config, _fingerprint(config, everyone, scenarios))
     try:
-        _run_missing(config, contestants, scenarios, store, console)
-        summaries, report = write_outputs(config, contestants, store.records)
+        with _exclusive(config.output):
+            store = _open_store(config, _fingerprint(config, everyone, scenarios))
+            _run_missing(config, contestants, scenarios, store, console)
+            summaries, report = write_outputs(config, contestants, store.records)
     except KeyboardInterrupt:
         console.print(
-            f"Stopped with {len(store.records)} episodes finished. "
+            f"Stopped; finished episodes are kept in {config.output}. "
             "Go on by running the same command again (without --fresh)."
         )
         raise SystemExit(130) from None
     print_results(console, summaries, report)
     return report
+
+
+@contextmanager
+def _exclusive(output: Path) -> Iterator[None]:
+    """Keep a second comparison out of the folder while this one runs."""
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        with FileLock(output / ".lock", timeout=0):
+            yield
+    except Timeout as error:
+        raise RecordError(
+            "output",
+            str(output),
+            "a folder that no other comparison writes to",
+            "Wait or choose another.",
+        ) from error
+    except OSError as error:
+        raise RecordError(
+            "output", str(output), "a folder that can be written", f"{error}."
+        ) from error
 
 
 def _selected(everyone: Sequence[Contestant], config: ComparisonConfig) -> tuple[Contestant, ...]:
@@ -96,7 +120,7 @@ def _fingerprint(
                 for contestant in everyone
                 if contestant.certificate is not None
             },
-            "agent": asdict(load_agent(SHIPPED_AGENT).card) if agent else None,
+            "agent": load_agent(SHIPPED_AGENT).digest if agent else None,
         }
     )
 

@@ -148,14 +148,15 @@ def default_contestants(beam: BeamParams, sigma_rad: float) -> tuple[Contestant,
 def agent_contestants(path: Path, beam: BeamParams, sigma_rad: float) -> tuple[Contestant, ...]:
     """Return an agent of the user's, without and with the ν_max wrapper.
 
-    Its name ends in what it was trained for, so that records of a longer training stay apart.
+    Its name ends in a digest of the agent, so that records of another never pass for its own.
 
     Raises:
         AgentFileError: the agent cannot be loaded.
         CertificateError: σ or the beam leaves no room for a certificate.
     """
     agent = load_agent(path)
-    name = f"{path.resolve().stem}@{agent.card.total_timesteps}"
+    folder = path.resolve() if path.is_dir() else path.resolve().parent
+    name = f"{folder.name}@{agent.digest}"
     l1 = certify(beam, sigma_rad=sigma_rad, method="l1", conditions=TRANSPORT_CONDITIONS)
     plain = Contestant(
         name=name,

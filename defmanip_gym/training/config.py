@@ -96,4 +96,21 @@ def load_hyperparameters(path: Path | None, algo: Algorithm) -> dict[str, Any]:
         raise ParameterError(
             "hyperparameters", str(path), f"a mapping with the key {ENV_ID}", "See the package's."
         )
-    return dict(content[ENV_ID])
+    return checked_hyperparameters(content[ENV_ID], str(path))
+
+
+def checked_hyperparameters(hyperparameters: dict[str, Any], source: str) -> dict[str, Any]:
+    """Return hyperparameters that have what training needs.
+
+    Raises:
+        ParameterError: an entry is missing.
+    """
+    missing = {"n_envs", "n_timesteps", "policy", "learning_rate"} - set(hyperparameters)
+    if missing:
+        raise ParameterError(
+            "hyperparameters",
+            source,
+            "n_envs, n_timesteps, policy, learning_rate and the algorithm's own",
+            f"It lacks {', '.join(sorted(missing))}.",
+        )
+    return dict(hyperparameters)

@@ -74,7 +74,8 @@ class RunFolder:
         """
         try:
             content = json.loads((self.path / _CONFIG).read_text())
-            return {"train": content["train"], **content}
+            keys = ("train", "hyperparameters", "command", "package_version", "git_revision")
+            return {key: content[key] for key in keys}
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise RunFolderError(
                 "resume", str(self.path), "a folder made by train.py", f"{_CONFIG}: {error}"

@@ -21,6 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from defmanip_gym.baselines.learned.actor import AgentCard
 from defmanip_gym.baselines.learned.agents import RUN_AGENT
 from defmanip_gym.envs.registration import ENV_ID
+from defmanip_gym.errors import RunFolderError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.training.callbacks import Periodically
@@ -29,7 +30,7 @@ from defmanip_gym.training.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from defmanip_gym.training.config import TrainConfig, load_hyperparameters
+from defmanip_gym.training.config import TrainConfig, checked_hyperparameters, load_hyperparameters
 from defmanip_gym.training.export import hidden_activation, to_actor
 from defmanip_gym.training.run_folder import RunFolder
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
@@ -56,8 +57,15 @@ def train(config: TrainConfig) -> Path:
     model = build_model(config, hyperparameters, venv)
     if config.resume is not None:
         read_checkpoint(folder.last_checkpoint(), model, venv)
+        # other starts than those of the part before
+        venv.seed((config.seed * 1000 + model.num_timesteps) % _VALIDATION_SEED)
     total = config.total_timesteps or int(hyperparameters["n_timesteps"])
-    model.set_logger(configure(str(folder.path / "curves"), ["csv", "tensorboard"]))
+    if model.num_timesteps >= total:
+        venv.close()
+        return folder.path
+    # a part of its own for every start of the run: SB3's writers begin their files anew
+    curves = str(folder.path / "curves" / f"from-{model.num_timesteps:010d}")
+    model.set_logger(configure(curves, ["csv", "tensorboard"]))
 
     def save() -> None:
         folder.save_checkpoint(
@@ -70,7 +78,7 @@ def train(config: TrainConfig) -> Path:
         _evaluation_env(config, venv),
         n_eval_episodes=config.evaluation_episodes,
         eval_freq=max(1, interval // venv.num_envs),
-        log_path=str(folder.path / "curves"),
+        log_path=curves,
         verbose=0,
         warn=False,
     )
@@ -169,7 +177,16 @@ def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any], RunFolde
     }
     if config.total_timesteps is not None:
         fields["total_timesteps"] = config.total_timesteps
-    return replace(TrainConfig(), **fields), stored["hyperparameters"], folder
+    try:
+        return (
+            replace(TrainConfig(), **fields),
+            checked_hyperparameters(stored["hyperparameters"], str(folder.path)),
+            folder,
+        )
+    except (TypeError, KeyError) as error:
+        raise RunFolderError(
+            "resume", str(folder.path), "a run of this version", f"config.json: {error}"
+        ) from error
 
 
 def _evaluation_env(config: TrainConfig, venv: VecNormalize) -> VecNormalize:

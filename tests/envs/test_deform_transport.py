@@ -3,6 +3,7 @@
 import copy
 import pickle
 import re
+import sys
 
 import gymnasium
 import numpy as np
@@ -12,13 +13,14 @@ from gymnasium.utils.env_checker import check_env
 import defmanip_gym  # noqa: F401 - registers the id
 from defmanip_gym.envs.deform_transport import DeformTransportEnv
 from defmanip_gym.envs.starts import PAPER_START
-from defmanip_gym.errors import ActionError, ParameterError, StartError
+from defmanip_gym.errors import ActionError, ParameterError, RenderingError, StartError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import (
     PAPER_DISTURBANCE,
     BeamParams,
     DisturbanceParams,
     RobotParams,
+    StartParams,
     TaskParams,
 )
 
@@ -257,6 +259,21 @@ def test_copies_and_pickles_are_equal_environments():
     for other in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
         assert other.config == env.config
         assert np.array_equal(other.reset(seed=1)[0], env.reset(seed=1)[0])
+
+
+def test_starts_that_sampling_could_not_take_are_refused_at_construction():
+    with pytest.raises(ParameterError, match="sigma_rad"):
+        DeformTransportEnv(sigma_rad=0.03)
+    with pytest.raises(StartError, match="workspace"):
+        DeformTransportEnv(task=TaskParams(start=StartParams(center=(100, 0, 0, 1, -1.5, 0))))
+
+
+def test_a_window_without_a_display_is_refused(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    if sys.platform == "linux":
+        with pytest.raises(RenderingError, match="display"):
+            DeformTransportEnv(render_mode="human").reset(seed=0)
 
 
 def test_success_needs_all_four_tolerances():

@@ -3,9 +3,10 @@
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
-from defmanip_gym.errors import ParameterError
+from defmanip_gym.errors import ParameterError, StartError
 from defmanip_gym.params import BeamParams, DisturbanceParams
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"
@@ -139,6 +140,20 @@ def test_a_failed_simulation_ends_only_its_own_episode():
     env.reset(options={"reset_mask": np.array([False, True, False])})
     *_, terminated, _, info = env.step(np.zeros((3, 3)))
     assert not terminated.any()
+
+
+def test_bad_resets_are_refused_by_name():
+    env = make(3, autoreset_mode="Disabled")
+    with pytest.raises(ResetNeeded):
+        env.step(np.zeros((3, 3)))
+    env.reset(seed=0)
+    for mask in (np.zeros(3, dtype=bool), np.ones(4, dtype=bool), [1, 0, 2]):
+        with pytest.raises(StartError, match="booleans"):
+            env.reset(options={"reset_mask": mask})
+    with pytest.raises(StartError, match="seed"):
+        env.reset(seed=[1, 2])
+    with pytest.raises(ParameterError, match="autoreset_mode"):
+        make(2, autoreset_mode="foo")
 
 
 @pytest.mark.parametrize(

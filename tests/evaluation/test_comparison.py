@@ -1,13 +1,22 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from defmanip_gym.baselines.controller import RandomController
+from defmanip_gym.baselines.learned.actor import MlpActor
+from defmanip_gym.baselines.learned.agents import load_agent
 from defmanip_gym.errors import CertificateError, ParameterError, RecordError
 from defmanip_gym.evaluation import comparison, outputs
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
-from defmanip_gym.evaluation.contestants import RandomPerEpisode, default_contestants
+from defmanip_gym.evaluation.contestants import (
+    RandomPerEpisode,
+    agent_contestants,
+    default_contestants,
+)
 from defmanip_gym.evaluation.store import RecordStore
 from defmanip_gym.params import BeamParams
 
@@ -148,3 +157,31 @@ def test_random_actions_belong_to_the_episode():
     np.testing.assert_array_equal(both[1], alone[0])
     # not the numbers that sampled the start of the same seed
     assert not np.array_equal(alone[0], RandomController(6).predict(np.zeros(19))[0])
+
+
+def test_a_second_comparison_in_the_same_folder_is_refused(tmp_path):
+    settings = config(tmp_path)
+    settings.output.mkdir(parents=True, exist_ok=True)
+    with FileLock(settings.output / ".lock"), pytest.raises(RecordError, match="no other"):
+        run_comparison(settings)
+
+
+def test_agents_of_one_folder_name_stay_apart_and_new_weights_are_run_anew(tmp_path):
+    shipped = load_agent("ppo-deform-transport-v0")
+    folders = [tmp_path / parent / "run" for parent in ("a", "b")]
+    for number, folder in enumerate(folders):
+        changed = replace(shipped.card, seed=number)
+        MlpActor(
+            changed,
+            weights=shipped._weights,
+            biases=shipped._biases,
+            observation_mean=shipped._mean,
+            observation_variance=shipped._variance,
+        ).save(folder / "agent")
+    beam, sigma = BeamParams(), 0.5
+    names = {agent_contestants(folder, beam, sigma)[0].name for folder in folders}
+    assert len(names) == 2
+    settings = config(tmp_path / "out", contestants=("zero",), agents=tuple(folders))
+    run_comparison(settings)
+    records = (settings.output / "records.jsonl").read_text().splitlines()[1:]
+    assert len(records) == settings.episodes * 5

@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 import yaml
+from safetensors.numpy import load_file, save_file
 from stable_baselines3.common.callbacks import BaseCallback
 
 from defmanip_gym.baselines.learned.agents import load_agent
@@ -68,7 +69,8 @@ def test_exported_agent_acts_as_the_trained_model(algo, config):
         "agent.json",
         "agent.safetensors",
     }
-    assert (folder / "curves" / "progress.csv").stat().st_size > 0
+    (progress,) = (folder / "curves").rglob("progress.csv")
+    assert progress.stat().st_size > 0
 
 
 @pytest.mark.parametrize("algo", ["ppo", "sac"])
@@ -78,6 +80,10 @@ def test_resumed_run_goes_on_from_its_checkpoint(algo, config):
     again = training.train(TrainConfig(resume=folder, total_timesteps=1024))
     assert again == folder
     assert load_agent(folder).card.total_timesteps == 1024 > before
+    curves = sorted((folder / "curves").rglob("progress.csv"))
+    assert len(curves) == 2 and all(curve.stat().st_size > 0 for curve in curves)
+    assert training.train(TrainConfig(resume=folder)) == folder  # finished: nothing to do
+    assert sorted((folder / "curves").rglob("progress.csv")) == curves
 
 
 def test_interrupted_run_keeps_its_state_and_says_how_to_go_on(config, monkeypatch, capsys):
@@ -146,6 +152,57 @@ def test_damaged_checkpoint_is_refused_by_name(config):
     (checkpoint / "model.zip").write_bytes(b"nonsense")
     with pytest.raises(RunFolderError, match="checkpoint"):
         training.train(TrainConfig(resume=folder, total_timesteps=1024))
+
+
+def rewritten(folder, **changes):
+    """Overwrite tensors of an agent and return its folder."""
+    path = folder / "agent.safetensors"
+    tensors = load_file(path) | changes
+    save_file({name: value for name, value in tensors.items() if value is not None}, path)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"layers.0.weight": np.full((64, 22), np.nan, np.float32)},
+        {"layers.0.weight": np.zeros((64, 21), np.float32)},
+        {"observation.variance": -np.ones(22)},
+        {"layers.2.weight": None, "layers.2.bias": None},
+    ],
+    ids=["not finite", "another size", "negative variance", "a layer short"],
+)
+def test_agents_with_impossible_tensors_are_refused(changes, config):
+    folder = training.train(config(total_timesteps=128))
+    load_agent(folder)
+    with pytest.raises(AgentFileError, match="agent"):
+        load_agent(rewritten(folder, **changes))
+
+
+@pytest.mark.parametrize(
+    "field", [{"activation": ["tanh"]}, {"action_size": "3"}, {"env_id": "CartPole-v1"}]
+)
+def test_cards_with_impossible_fields_are_refused(field, config):
+    folder = training.train(config(total_timesteps=128))
+    card = folder / "agent.json"
+    card.write_text(json.dumps(json.loads(card.read_text()) | field))
+    with pytest.raises(AgentFileError):
+        load_agent(folder)
+
+
+def test_incomplete_configurations_are_refused_and_leave_nothing(config, tmp_path):
+    path = tmp_path / "short.yml"
+    path.write_text(yaml.safe_dump({ENV_ID: {"policy": "MlpPolicy"}}))
+    with pytest.raises(ParameterError, match="n_envs"):
+        training.train(config(hyperparameters=path))
+    assert not (tmp_path / "runs").exists()
+    folder = training.train(config(total_timesteps=128))
+    stored = json.loads((folder / "config.json").read_text())
+    for damage in ({"command": None}, {"train": stored["train"] | {"colour": "red"}}):
+        broken = {key: value for key, value in (stored | damage).items() if value is not None}
+        (folder / "config.json").write_text(json.dumps(broken))
+        with pytest.raises(RunFolderError):
+            training.train(TrainConfig(resume=folder))
 
 
 def test_missing_damaged_and_foreign_agents_are_refused(config, tmp_path):

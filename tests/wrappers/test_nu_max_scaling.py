@@ -3,11 +3,12 @@
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.baselines.tanner import TannerController, TannerParams
-from defmanip_gym.errors import CertificateError
+from defmanip_gym.errors import ActionError, CertificateError
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import (
     TRANSPORT_CONDITIONS,
@@ -172,6 +173,23 @@ def test_certificates_that_do_not_fit_are_refused():
         NuMaxActionScaling(gymnasium.make(ENV_ID, sigma_rad=0.3), L1)
     with pytest.raises(CertificateError, match="DeformTransport"):
         NuMaxActionScaling(gymnasium.make("CartPole-v1"), L1)
+
+
+def test_transformed_observations_inside_are_refused():
+    env = gymnasium.make(ENV_ID)
+    blind = gymnasium.wrappers.TransformObservation(env, lambda o: o * 0, env.observation_space)
+    with pytest.raises(CertificateError, match="around"):
+        NuMaxActionScaling(blind, L1)
+    with pytest.raises(ResetNeeded):
+        NuMaxVectorActionScaling(batch().env, L1).step(np.zeros((8, 3)))
+
+
+def test_bad_actions_are_refused_by_name():
+    env = NuMaxActionScaling(gymnasium.make(ENV_ID), L1)
+    env.reset(seed=0)
+    for action in ("abc", np.zeros(2), np.full(3, np.nan)):
+        with pytest.raises(ActionError):
+            env.step(action)
 
 
 def test_conditions_that_leave_no_room_are_refused():

@@ -7,9 +7,11 @@ multilayer perceptron.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +21,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file, save
 
 from defmanip_gym.baselines.controller import State
+from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.files import write_atomically
 
@@ -94,8 +97,19 @@ class MlpActor:
         self.card = card
         self._weights, self._biases = weights, biases
         self._mean, self._variance = observation_mean, observation_variance
-        self._scale = 1.0 / np.sqrt(observation_variance + _VARIANCE_FLOOR)
         self._activation = _ACTIVATIONS[card.activation]
+
+    @cached_property
+    def _scale(self) -> Array:
+        return 1.0 / np.sqrt(self._variance + _VARIANCE_FLOOR)
+
+    @property
+    def digest(self) -> str:
+        """Eight hexadecimal digits that tell this agent from every other."""
+        content = hashlib.sha256(json.dumps(asdict(self.card), sort_keys=True).encode())
+        for array in (self._mean, self._variance, *self._weights, *self._biases):
+            content.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
+        return content.hexdigest()[:8]
 
     @property
     def observation_size(self) -> int:
@@ -166,11 +180,32 @@ def load_actor(stem: Path) -> MlpActor:
         raise AgentFileError(
             "agent", str(path), "an existing file", "Train one with train.py."
         ) from error
-    except (SafetensorError, KeyError, OSError) as error:
+    except (SafetensorError, KeyError, OSError, ValueError) as error:
         raise AgentFileError(
             "agent", str(path), "tensors written by this package", f"It is damaged: {error}"
         ) from error
+    _check_shapes(actor, path)
     return actor
+
+
+def _check_shapes(actor: MlpActor, path: Path) -> None:
+    """Raise AgentFileError unless the layers lead from observations to actions, all finite."""
+    size = actor.card.observation_size
+    arrays = [actor._mean, actor._variance, *actor._weights, *actor._biases]
+    widths = [size, *(len(bias) for bias in actor._biases if bias.ndim == 1)]
+    expected = list(zip(widths[1:], widths[:-1], strict=True))
+    fits = (
+        len(actor._weights) > 0
+        and [weight.shape for weight in actor._weights] == expected
+        and widths[-1] == actor.card.action_size
+        and actor._mean.shape == actor._variance.shape == (size,)
+    )
+    if not fits or not all(np.isfinite(array).all() for array in arrays):
+        raise AgentFileError(
+            "agent", str(path), "finite layers of matching sizes", "It is damaged or foreign."
+        )
+    if (actor._variance < 0).any():
+        raise AgentFileError("agent", str(path), "variances >= 0", "It is damaged or foreign.")
 
 
 def _load_card(path: Path) -> AgentCard:
@@ -193,6 +228,13 @@ def _load_card(path: Path) -> AgentCard:
         card = AgentCard(**fields)
     except TypeError as error:
         raise AgentFileError("agent card", str(path), "the card's fields", f"{error}") from error
+    for name, kind in (("observation_size", int), ("action_size", int), ("activation", str)):
+        if type(getattr(card, name)) is not kind:
+            raise AgentFileError(name, getattr(card, name), kind.__name__, "Check the card.")
+    if card.env_id != ENV_ID:
+        raise AgentFileError(
+            "env_id", card.env_id, ENV_ID, "It was trained on another environment."
+        )
     if card.activation not in _ACTIVATIONS:
         raise AgentFileError("activation", card.activation, "'tanh' or 'relu'", "Check the card.")
     return card
