@@ -13,7 +13,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
 from defmanip_gym.params import DisturbanceParams
 from defmanip_gym.plant.simulation import PlantState
-from defmanip_gym.theory.frames import base_to_world
+from defmanip_gym.theory.frames import base_to_world, world_to_base
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 
 Array = NDArray[np.float64]
@@ -55,18 +55,11 @@ class Surveyor:
         rates = (self._kinematics.jacobian(pitch) * pitch_rate[:, None, :]).sum(-1)
         reach, u1, u2 = reach_and_height[:, 0], plant.base_velocity[:, 0], plant.base_velocity[:, 1]
         velocity = np.stack((u1 + rates[:, 0], reach * u2, rates[:, 1]), axis=1)
-        heading = plant.base_pose[:, 2]
-        cos, sin = np.cos(heading), np.sin(heading)
-        to_goal_x = self._goal_position[0] - plant.base_pose[:, 0]
-        to_goal_y = self._goal_position[1] - plant.base_pose[:, 1]
-        offset = np.stack(
-            (
-                cos * to_goal_x + sin * to_goal_y - reach,
-                cos * to_goal_y - sin * to_goal_x,
-                self._goal_position[2] - reach_and_height[:, 1],
-            ),
-            axis=1,
-        )
+        heading, offset = plant.base_pose[:, 2], np.empty_like(velocity)
+        offset[:, :2] = self._goal_position[:2] - plant.base_pose[:, :2]
+        offset[:, 2] = self._goal_position[2] - reach_and_height[:, 1]
+        offset = world_to_base(offset, heading)
+        offset[:, 0] -= reach
         heading_error = transport.wrapped(heading - self._task.goal[2])
         position = -base_to_world(offset, heading_error)[:, :2]
         state = transport.TaskState(

@@ -10,14 +10,12 @@ import yaml
 
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import ParameterError
+from defmanip_gym.evaluation.scenarios import FIRST_EVALUATION_SEED
 from defmanip_gym.validation import require_choice, require_non_negative, require_whole
 
 Algorithm = Literal["ppo", "sac", "td3"]
 
 HYPERPARAMETERS = Path(__file__).parents[1] / "baselines" / "learned" / "hyperparams"
-
-# Evaluation scenarios start here; training never uses their seeds.
-FIRST_EVALUATION_SEED = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
