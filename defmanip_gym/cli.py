@@ -12,6 +12,7 @@ from rich.console import Console
 
 from defmanip_gym.errors import DefmanipError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
+from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
 
 Config = TypeVar("Config")
@@ -19,7 +20,11 @@ Config = TypeVar("Config")
 
 def main() -> None:
     """Entry point of ``defmanip``."""
-    commands: dict[str, Callable[..., Any]] = {"train": TrainConfig, "compare": ComparisonConfig}
+    commands: dict[str, Callable[..., Any]] = {
+        "train": TrainConfig,
+        "compare": ComparisonConfig,
+        "reproduce": ReproductionConfig,
+    }
     _guarded(
         lambda: _run(
             tyro.extras.subcommand_cli_from_dict(
@@ -54,6 +59,10 @@ def _run(config: object) -> None:
 
         folder = train(config)
         print(f"Run folder: {folder}")
+    elif isinstance(config, ReproductionConfig):
+        from defmanip_gym.reproduction.reproduce import run_reproduction  # matplotlib, too
+
+        run_reproduction(config)
 
 
 def _guarded(command: Callable[[], None]) -> None:

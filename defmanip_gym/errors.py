@@ -34,6 +34,10 @@ class StartError(InvalidValueError):
     """A start state that the robot cannot take, or unknown reset options."""
 
 
+class ObjectFileError(InvalidValueError):
+    """A model file that cannot be read, or is not an object that certificates are made for."""
+
+
 class CertificateError(InvalidValueError):
     """A certificate that does not exist for this object, or does not fit this environment."""
 
@@ -52,6 +56,10 @@ class RunFolderError(InvalidValueError):
 
 class RecordError(InvalidValueError):
     """Evaluation records that cannot be read or do not belong to this comparison."""
+
+
+class DivergenceError(InvalidValueError):
+    """A simulation that diverged where it must not."""
 
 
 class RenderingError(DefmanipError, RuntimeError):

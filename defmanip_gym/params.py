@@ -114,9 +114,9 @@ class RobotParams:
 class BeamParams:
     """A uniform beam hanging from the grasp, cut into equal rigid segments joined by hinges.
 
-    ``damping`` acts on the first segment's swing measured from the vertical; the joint values act
-    between neighbouring segments. The default is the reference beam: with ``damping=1.0`` it
-    reproduces the paper's ν_max, and 0.1 is what the paper simulates.
+    ``damping`` and ``root_stiffness`` act on the first segment's swing measured from the vertical;
+    the joint values act between neighbouring segments. The default is the reference beam: with
+    ``damping=1.0`` it reproduces the paper's ν_max, and 0.1 is what the paper simulates.
     """
 
     mass_kg: float = 3.1153
@@ -125,6 +125,7 @@ class BeamParams:
     segment_count: int = 1
     joint_stiffness: float = 20.0
     joint_damping: float = 0.2
+    root_stiffness: float = 0.0
     radius_m: float = 0.02
 
     def __post_init__(self) -> None:
@@ -134,6 +135,7 @@ class BeamParams:
         require_whole("segment_count", self.segment_count, 1)
         require_non_negative("joint_stiffness", self.joint_stiffness, "N m/rad")
         require_non_negative("joint_damping", self.joint_damping, "N m s/rad")
+        require_non_negative("root_stiffness", self.root_stiffness, "N m/rad")
         _require_slender("radius_m", self.radius_m, self.segment_length_m)
 
     @property

@@ -17,10 +17,13 @@ LAYERS = [
     {"validation"},
     {"params", "observation"},
     {"theory", "plant"},
+    {"objects"},
+    {"attack"},
     {"envs"},
     {"wrappers"},
     {"baselines"},
     {"evaluation"},
+    {"reproduction"},
     {"training"},
     {"cli", "__main__"},
 ]

@@ -13,18 +13,14 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.baselines.cascade import Cascade, GraspSample, LoopMemory
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.errors import CertificateError, GainError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams, TaskParams
 from defmanip_gym.theory.certificates import Certificate
-from defmanip_gym.theory.control_laws import (
-    ForceLoopGains,
-    force_loop,
-    integrate_unless_saturated,
-    saturated_tracking,
-)
-from defmanip_gym.theory.frames import base_to_world, world_to_base
+from defmanip_gym.theory.control_laws import ForceLoopGains
+from defmanip_gym.theory.frames import base_to_world
 from defmanip_gym.theory.object_model import HangingBeam
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.theory.stability import SampledLoop
@@ -90,6 +86,8 @@ class TannerController:
         task: goal, limits and control period.
         certificate: bounds on the motion.
         params: design choices.
+        require_stability: False builds the controller also with gains for which the sampled loop
+            is unstable, to study what they do.
 
     Raises:
         GainError: the sampled loop would be unstable with these gains.
@@ -104,6 +102,7 @@ class TannerController:
         task: TaskParams | None = None,
         certificate: Certificate | None = None,
         params: TannerParams | None = None,
+        require_stability: bool = True,
     ) -> None:
         self.beam, self.robot = beam or BeamParams(), robot or RobotParams()
         self.task, self.params = task or TaskParams(), params or TannerParams()
@@ -112,9 +111,21 @@ class TannerController:
         self.object = HangingBeam(self.beam, damping=self.params.force_law_damping)
         self.kinematics = ArmKinematics(self.robot)
         self._check_certificate()
-        self._check_gains()
+        if require_stability:
+            self._check_gains()
         self.bound, self.yaw_rate_bound, max_speed = self._bounds()
         self.field = self._velocity_field(max_speed)
+        self.cascade = Cascade(
+            object=self.object,
+            field=self.field,
+            tracking_gain=self.params.tracking_gain,
+            gains=self.params.gains,
+            u_o_bound=self.params.bound_share * self.bound,
+            w_limit=self.task.max_acceleration_m_s2,
+            yaw_rate_bound=self.yaw_rate_bound,
+            period_s=self.task.control_period_s,
+            feedforward=self.params.feedforward,
+        )
 
     def predict(
         self,
@@ -125,69 +136,41 @@ class TannerController:
     ) -> tuple[Array, State | None]:
         """Return w / a_max and (∫Δu_o, the u_o of this sample)."""
         batch = np.atleast_2d(observation)
-        error_integral, u_o_before = self._memory(len(batch), state, episode_start)
+        memory = self._memory(len(batch), state, episode_start)
+        command = self.cascade.command(self._sample(batch), memory)
+        action = np.clip(command.w / self.task.max_acceleration_m_s2, -1.0, 1.0)
+        memory = command.memory
+        return action.reshape(*observation.shape[:-1], 3), (memory.error_integral, memory.u_o)
+
+    def _sample(self, batch: Array) -> GraspSample:
+        """Read observations (n, size)."""
 
         def part(name: str) -> Array:
             return self.layout.part(batch, name)
 
         heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
-        velocity, yaw_rate = part("grasp_velocity_b"), part("base_velocity")[:, 1]
-        desired, desired_rate = self._desired_motion(part("goal_offset_b"), velocity, heading)
-        u_o = saturated_tracking(
-            velocity - self._with_gentle_turn(desired, part("joints")),
-            self.params.tracking_gain,
-            self.params.bound_share * self.bound,
-            desired_rate,
+        pitch = part("joints") @ JOINT_TO_PITCH.T
+        return GraspSample(
+            position=base_to_world(-part("goal_offset_b"), heading),
+            heading=heading,
+            velocity_b=part("grasp_velocity_b"),
+            yaw_rate=part("base_velocity")[:, 1],
+            reach=self.kinematics.reach_and_height(pitch)[:, 0],
+            swing=part("swing"),
+            swing_rate=part("swing_rate"),
+            force_b=part("grasp_force_b"),
         )
-        # Section IV: Δu_o compares the measured force with the one the last u_o called for
-        error = self.object.acceleration_error(
-            part("swing"), part("swing_rate"), yaw_rate, u_o_before, part("grasp_force_b")
-        )
-        advanced = error_integral + self.task.control_period_s * error
-        w = force_loop(u_o, error, advanced, self.params.gains)
-        # only u_o is bounded by the certificate: the rest of w makes up for disturbances
-        limit = self.task.max_acceleration_m_s2
-        error_integral = integrate_unless_saturated(
-            error_integral, error, w, np.full(3, limit), self.task.control_period_s
-        )
-        action = np.clip(w / limit, -1.0, 1.0)
-        return action.reshape(*observation.shape[:-1], 3), (error_integral, u_o)
-
-    def _desired_motion(
-        self, goal_offset_b: Array, velocity_b: Array, heading: Array
-    ) -> tuple[Array, Array]:
-        """Return ż_1d of Section IV.A and its rate of change along the motion, (n, 3) each.
-
-        The field lives in world axes with the goal at the origin. The paper lets z̈_1d = 0; without
-        it the grasp drifts off the streamline and arrives with the wrong heading.
-        """
-        position = base_to_world(-goal_offset_b, heading)
-        desired = self.field.velocity(position)
-        if not self.params.feedforward:
-            return world_to_base(desired, heading), np.zeros_like(desired)
-        period = self.task.control_period_s
-        ahead = self.field.velocity(position + period * base_to_world(velocity_b, heading))
-        rate = (ahead - desired) / period
-        return world_to_base(desired, heading), world_to_base(rate, heading)
 
     def _memory(
         self, count: int, state: State | None, episode_start: NDArray[np.bool_] | None
-    ) -> tuple[Array, Array]:
-        """Return integral and previous u_o, (n, 3) each, zero where an episode starts."""
+    ) -> LoopMemory:
+        """Return the force loop's memory, empty where an episode starts."""
         if state is None:
-            return np.zeros((count, 3)), np.zeros((count, 3))
+            return LoopMemory.empty(count)
         if episode_start is None:
-            return state[0], state[1]
+            return LoopMemory(error_integral=state[0], u_o=state[1])
         running = ~np.atleast_1d(episode_start)[:, None]
-        return state[0] * running, state[1] * running
-
-    def _with_gentle_turn(self, desired: Array, joints: Array) -> Array:
-        """Bound the leftward velocity, which is reach times yaw rate."""
-        reach = self.kinematics.reach_and_height(joints @ JOINT_TO_PITCH.T)[:, 0]
-        limit = 0.8 * self.yaw_rate_bound * reach
-        return np.stack(
-            (desired[:, 0], np.clip(desired[:, 1], -limit, limit), desired[:, 2]), axis=1
-        )
+        return LoopMemory(error_integral=state[0] * running, u_o=state[1] * running)
 
     def _bounds(self) -> tuple[Array, float, float]:
         """Return the bound on w per axis (m/s²), on the yaw rate and on the speed."""
@@ -220,10 +203,10 @@ class TannerController:
         certificate = self.certificate
         if certificate is None:
             return
-        if certificate.beam.segment_count != self.beam.segment_count:
+        if certificate.coordinate_count != self.beam.segment_count:
             raise CertificateError(
-                "certificate.beam.segment_count",
-                certificate.beam.segment_count,
+                "certificate.coordinate_count",
+                certificate.coordinate_count,
                 f"{self.beam.segment_count}, that of the beam carried",
                 "Compute the certificate for this beam.",
             )
@@ -235,8 +218,9 @@ class TannerController:
                 "Pass conditions=TRANSPORT_CONDITIONS to certify().",
             )
 
-    def _check_gains(self) -> None:
-        loop = SampledLoop(
+    def sampled_loop(self) -> SampledLoop:
+        """Return the loop near the goal, if robot and beam are as the controller knows them."""
+        return SampledLoop(
             robot=self.robot,
             goal_pitch=JOINT_TO_PITCH @ np.array(self.task.goal[3:5]),
             beam=self.beam,
@@ -248,7 +232,9 @@ class TannerController:
             period_s=self.task.control_period_s,
             feedforward=self.params.feedforward,
         )
-        radius = loop.spectral_radius()
+
+    def _check_gains(self) -> None:
+        radius = self.sampled_loop().spectral_radius()
         if radius >= 1.0:
             gains = self.params.gains
             raise GainError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -82,16 +82,7 @@ class TransportConfig:
         """Beam parameters of the feedback linearization."""
         if self.nominal_beam is not None:
             return self.nominal_beam
-        beam = self.beam
-        return BeamParams(
-            mass_kg=beam.mass_kg,
-            length_m=beam.length_m,
-            damping=0.0,
-            segment_count=beam.segment_count,
-            joint_stiffness=beam.joint_stiffness,
-            joint_damping=beam.joint_damping,
-            radius_m=beam.radius_m,
-        )
+        return replace(self.beam, damping=0.0)
 
     @property
     def goal_reach_and_height_m(self) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """The MuJoCo model of base, arm and beam, from parameters.
 
-Pitches are positive upwards, so hinge axes point along −y. Contacts are off: the task is about
-dynamics, and the paper's start lets the beam's tip pass 3 cm below the floor's plane.
+Contacts are off: the task is about dynamics, and the paper's start lets the beam's tip pass 3 cm
+below the floor's plane.
 """
 
 from __future__ import annotations
@@ -10,16 +10,14 @@ import mujoco
 
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, LinkParams, RobotParams
 from defmanip_gym.plant import names
+from defmanip_gym.plant.beam_body import add_beam, add_pitch_hinge, set_inertia
 from defmanip_gym.plant.scene import (
-    BEAM_COLOR,
     ROBOT_COLOR,
-    SMALLEST_DRAWN_RADIUS_M,
     WHEEL_COLOR,
     add_tracking_camera,
     dress,
 )
 
-_PITCH_AXIS = [0.0, -1.0, 0.0]
 # N·s/m: at 60 kg and 1 m/s² of lateral acceleration the base slips 0.06 mm/s
 _NO_SLIP_GAIN = 1e6
 
@@ -63,7 +61,7 @@ def _add_base(spec: mujoco.MjSpec, robot: RobotParams) -> mujoco.MjsBody:
     base.add_joint(name=names.BASE_Y, type=slide, axis=[0, 1, 0])
     base.add_joint(name=names.BASE_YAW, type=hinge, axis=[0, 0, 1])
     # only yaw is free, so any admissible roll and pitch inertia will do
-    _set_inertia(base, robot.base_mass_kg, [0, 0, 0.15], [robot.base_yaw_inertia_kgm2] * 3)
+    set_inertia(base, robot.base_mass_kg, [0, 0, 0.15], [robot.base_yaw_inertia_kgm2] * 3)
     base.add_site(name=names.BASE_SITE, rgba=[0, 0, 0, 0])
     _add_base_geoms(base, robot.shoulder_height_m)
     add_tracking_camera(base)
@@ -104,10 +102,10 @@ def _add_base_geoms(base: mujoco.MjsBody, height: float) -> None:
 
 def _add_arm(base: mujoco.MjsBody, robot: RobotParams) -> mujoco.MjsBody:
     upper_arm = base.add_body(name=names.UPPER_ARM, pos=[0, 0, robot.shoulder_height_m])
-    _add_hinge(upper_arm, names.SHOULDER, robot.joint_armature_kgm2)
+    add_pitch_hinge(upper_arm, names.SHOULDER, robot.joint_armature_kgm2)
     _add_link(upper_arm, robot.upper_arm, "upper_arm_geom")
     forearm = upper_arm.add_body(name=names.FOREARM, pos=[robot.upper_arm.length_m, 0, 0])
-    _add_hinge(forearm, names.ELBOW, robot.joint_armature_kgm2)
+    add_pitch_hinge(forearm, names.ELBOW, robot.joint_armature_kgm2)
     _add_link(forearm, robot.forearm, "forearm_geom")
     return forearm
 
@@ -115,42 +113,20 @@ def _add_arm(base: mujoco.MjsBody, robot: RobotParams) -> mujoco.MjsBody:
 def _add_beam(
     spec: mujoco.MjSpec, forearm: mujoco.MjsBody, robot: RobotParams, beam: BeamParams
 ) -> None:
-    length, mass = beam.segment_length_m, beam.segment_mass_kg
-    across = mass * length**2 / 12
-    along = mass * beam.radius_m**2 / 2
-    parent, position = forearm, [robot.forearm.length_m, 0.0, 0.0]
-    for index in range(beam.segment_count):
-        body = parent.add_body(name=names.segment(index), pos=position)
-        joint = _add_hinge(body, names.segment_hinge(index), 0.0)
-        if index > 0:
-            joint.stiffness[0] = beam.joint_stiffness
-            joint.damping[0] = beam.joint_damping
-        _set_inertia(body, mass, [0, 0, -length / 2], [across, across, along])
-        body.add_geom(
-            name=names.segment_geom(index),
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[0, 0, 0, 0, 0, -length],
-            size=[max(beam.radius_m, SMALLEST_DRAWN_RADIUS_M), 0, 0],
-            rgba=BEAM_COLOR,
-            mass=0,
-        )
-        parent, position = body, [0.0, 0.0, -length]
-    _add_root_damper(spec, beam)
-    site = spec.body(names.segment(0)).add_site(name="beam_root", rgba=[0, 0, 0, 0])
+    root = add_beam(
+        spec,
+        forearm,
+        beam,
+        position_m=[robot.forearm.length_m, 0.0, 0.0],
+        pitch_joints=(names.SHOULDER, names.ELBOW),
+    )
+    site = root.add_site(name="beam_root", rgba=[0, 0, 0, 0])
     spec.add_sensor(
         name=names.GRASP_FORCE,
         type=mujoco.mjtSensor.mjSENS_FORCE,
         objtype=mujoco.mjtObj.mjOBJ_SITE,
         objname=site.name,
     )
-
-
-def _add_root_damper(spec: mujoco.MjSpec, beam: BeamParams) -> None:
-    """Damp q1 + q2 + hinge, the first segment's swing from the vertical."""
-    tendon = spec.add_tendon(name=names.ROOT_DAMPER)
-    tendon.damping[0] = beam.damping
-    for joint in (names.SHOULDER, names.ELBOW, names.segment_hinge(0)):
-        tendon.wrap_joint(joint, 1.0)
 
 
 def _add_actuators(spec: mujoco.MjSpec, robot: RobotParams) -> None:
@@ -175,16 +151,10 @@ def _add_actuators(spec: mujoco.MjSpec, robot: RobotParams) -> None:
     wheel.set_to_velocity(kv=_NO_SLIP_GAIN)
 
 
-def _add_hinge(body: mujoco.MjsBody, name: str, armature: float) -> mujoco.MjsJoint:
-    return body.add_joint(
-        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_PITCH_AXIS, armature=armature
-    )
-
-
 def _add_link(body: mujoco.MjsBody, link: LinkParams, geom_name: str) -> None:
     across = link.mass_kg * link.length_m**2 / 12
     along = link.mass_kg * link.radius_m**2 / 2
-    _set_inertia(body, link.mass_kg, [link.length_m / 2, 0, 0], [along, across, across])
+    set_inertia(body, link.mass_kg, [link.length_m / 2, 0, 0], [along, across, across])
     body.add_geom(
         name=geom_name,
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -193,13 +163,3 @@ def _add_link(body: mujoco.MjsBody, link: LinkParams, geom_name: str) -> None:
         rgba=ROBOT_COLOR,
         mass=0,
     )
-
-
-def _set_inertia(
-    body: mujoco.MjsBody, mass: float, center: list[float], diagonal: list[float]
-) -> None:
-    body.explicitinertial = True
-    body.mass = mass
-    body.ipos = center
-    body.iquat = [1.0, 0, 0, 0]
-    body.inertia = diagonal

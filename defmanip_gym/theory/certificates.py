@@ -1,66 +1,57 @@
-"""Bounds on the grasp motion under which ‖z2‖∞ ≤ σ: Eqs. (17), (18) and the exact linear one.
+"""Bounds on the grasp motion under which ‖z2‖∞ ≤ σ: a ladder from Eq. (18) to the exact one.
 
 =================  ==================================================================
-``tanner``         Eq. (18) with the radical that Eq. (21) implies, √(λ_m/λ_M)
 ``tanner_printed`` Eq. (18) as printed, √(λ_M/λ_m); for comparison only, not a certificate
+``tanner``         Eq. (18) with the radical that Eq. (21) implies, √(λ_m/λ_M)
+``lyapunov``       the same P without the slack of norm conversions
+``ellipsoid``      the best invariant ellipsoid
 ``l1``             σ / ∫|C e^{At} B| dt, which no smaller bound on the linear model can beat
 =================  ==================================================================
+
+Every rung treats lifting, turning, initial states and intervals of parameters the same way
+(``small_gain``, ``worst_case``) and says how much of it is proven for the nonlinear object.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, TypeGuard
 
 import numpy as np
 
 from defmanip_gym.errors import CertificateError
-from defmanip_gym.params import BeamParams, validated_sigma
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.impulse_response import peak_free_response, peak_gains
-from defmanip_gym.theory.zero_dynamics import (
-    LinearizedObject,
-    equilibrium,
-    is_hurwitz,
-    linearize,
-    lyapunov_matrix,
+from defmanip_gym.params import GRAVITY_M_S2, BeamParams, validated_sigma
+from defmanip_gym.theory.conditions import (
+    EXACT_PARAMETERS,
+    TRANSPORT_CONDITIONS,
+    CertificateConditions,
+    ParameterIntervals,
 )
-from defmanip_gym.validation import require_choice, require_instance, require_non_negative
-
-
-@dataclass(frozen=True, kw_only=True)
-class CertificateConditions:
-    """What a certificate takes for granted about the motion.
-
-    Attributes:
-        vertical_acceleration_m_s2: |vertical grasp acceleration| stays below this.
-        yaw_rate_rad_s: |u2| stays below this.
-        initial_swing_rad: the beam starts straight and at rest, at most this far off the vertical.
-        acceleration_error_m_s2: forward acceleration stays this close to what it was meant to be.
-        vertical_error_m_s2: the same for the vertical one.
-    """
-
-    vertical_acceleration_m_s2: float = 0.0
-    yaw_rate_rad_s: float = 0.0
-    initial_swing_rad: float = 0.0
-    acceleration_error_m_s2: float = 0.0
-    vertical_error_m_s2: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            require_non_negative(name, getattr(self, name))
-
-
-# Room for the transport task: 0.43 m of lifting, one turn of some 70 degrees, sampled starts, and
-# what disturbances do within the control period in which they change.
-TRANSPORT_CONDITIONS = CertificateConditions(
-    vertical_acceleration_m_s2=0.05,
-    yaw_rate_rad_s=0.3,
-    initial_swing_rad=0.05,
-    acceleration_error_m_s2=0.01,
-    vertical_error_m_s2=0.01,
+from defmanip_gym.theory.limits import (
+    CERTIFICATE_METHODS,
+    SHARED_WITH_SPEED,
+    linear_limit,
+    nonlinear_limit,
 )
+from defmanip_gym.theory.zero_dynamics import LinearizedObject, is_hurwitz, linearize
+from defmanip_gym.validation import require_choice, require_instance
+
+Proof = Literal["nonlinear", "linear", "none"]
+Deformable = BeamParams | LinearizedObject
+_NEGLIGIBLE_TORQUE = 1e-6
+_Pairs = tuple[tuple[float, float], ...]
+
+__all__ = [
+    "CERTIFICATE_METHODS",
+    "EXACT_PARAMETERS",
+    "TRANSPORT_CONDITIONS",
+    "Certificate",
+    "CertificateConditions",
+    "ParameterIntervals",
+    "certify",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,24 +60,73 @@ class Certificate:
 
     Attributes:
         method: key of the method in this module's table.
-        is_proven: whether a proof for the linearized object stands behind it; attacks on the
-            nonlinear one are in the tests.
         sigma_rad: σ of Eq. (9).
-        beam: the object it was computed for.
+        deformable: the object it was computed for.
         nu_max: the bound on sup‖ν‖∞ before it is shared between speed and acceleration, m/s².
-        acceleration_bound: largest commanded forward acceleration, m/s².
+        acceleration_bound: largest commanded forward acceleration, m/s²; for objects that sideways
+            acceleration deforms, on each horizontal axis.
         speed_bound: largest grasp speed, m/s; infinite where speed does not deform the object.
         conditions: what it takes for granted, enforced by ``NuMaxActionScaling``.
+        intervals: factors on damping and stiffness for which it holds.
+        worst_factors: the (damping, stiffness) factors where the bound is smallest.
     """
 
     method: str
-    is_proven: bool
     sigma_rad: float
-    beam: BeamParams
+    deformable: Deformable
     nu_max: float
     acceleration_bound: float
     speed_bound: float
-    conditions: CertificateConditions = field(default_factory=CertificateConditions)
+    conditions: CertificateConditions
+    intervals: ParameterIntervals
+    worst_factors: tuple[float, float]
+
+    @property
+    def coordinate_count(self) -> int:
+        """Number N of internal coordinates of its object."""
+        if isinstance(self.deformable, BeamParams):
+            return self.deformable.segment_count
+        return self.deformable.count
+
+    def covers(self, beam: BeamParams) -> bool:
+        """Whether it holds for this beam: the certified one within the intervals.
+
+        More damping than certified never hurts a single hinge, whose phase plane shows it.
+        """
+        certified = self.deformable
+        if not isinstance(certified, BeamParams):
+            return False
+        if beam.segment_count == certified.segment_count == 1:
+            low, high = self.intervals.damping[0], math.inf
+            dampings: _Pairs = ((beam.damping, certified.damping),)
+            stiffnesses: _Pairs = ((beam.root_stiffness, certified.root_stiffness),)
+        else:
+            low, high = self.intervals.damping
+            dampings = (
+                (beam.damping, certified.damping),
+                (beam.joint_damping, certified.joint_damping),
+            )
+            stiffnesses = (
+                (beam.root_stiffness, certified.root_stiffness),
+                (beam.joint_stiffness, certified.joint_stiffness),
+            )
+        same_rods = certified == replace(
+            beam,
+            damping=certified.damping,
+            joint_damping=certified.joint_damping,
+            root_stiffness=certified.root_stiffness,
+            joint_stiffness=certified.joint_stiffness,
+        )
+        return (
+            same_rods
+            and _share_a_factor(dampings, low, high)
+            and _share_a_factor(stiffnesses, *self.intervals.stiffness)
+        )
+
+    @property
+    def resulting_acceleration(self) -> float:
+        """Largest forward acceleration that the object may meet: the bound plus its error, m/s²."""
+        return self.acceleration_bound + self.conditions.acceleration_error_m_s2
 
     @property
     def vertical_acceleration_bound(self) -> float:
@@ -94,39 +134,80 @@ class Certificate:
         conditions = self.conditions
         return max(conditions.vertical_acceleration_m_s2 - conditions.vertical_error_m_s2, 0.0)
 
+    @cached_property
+    def nonlinear_limit(self) -> float | None:
+        """Acceleration bound, m/s², proven for the nonlinear object under the same conditions.
+
+        ``None`` where only the linearization is known. Exact for one hinge; beyond, the proof is
+        conservative, and a certificate above it rests on the linear model and on attacks.
+        """
+        if not isinstance(self.deformable, BeamParams):
+            return None
+        return nonlinear_limit(self.deformable, self.sigma_rad, self.conditions, self.intervals)
+
+    @property
+    def proof(self) -> Proof:
+        """For which model of the object the bound is proven."""
+        if self.method == "tanner_printed":
+            return "none"
+        limit = self.nonlinear_limit
+        is_within = limit is not None and self.resulting_acceleration <= limit
+        return "nonlinear" if is_within else "linear"
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether a proof, for the linearized object at least, stands behind it."""
+        return self.proof != "none"
+
 
 def certify(
-    beam: BeamParams,
+    deformable: Deformable,
     *,
     sigma_rad: float = math.pi / 6,
     method: str = "l1",
     conditions: CertificateConditions | None = None,
+    intervals: ParameterIntervals | None = None,
 ) -> Certificate:
-    """Compute a certificate for a beam.
+    """Compute a certificate for an object.
 
     Args:
-        beam: the object; use the lower end of its damping interval.
-        sigma_rad: admissible deformation σ.
-        method: ``"l1"``, ``"tanner"`` or ``"tanner_printed"``.
+        deformable: a beam, or the linearization of any object.
+        sigma_rad: admissible deformation σ; in m for coordinates that are slides.
+        method: one of ``CERTIFICATE_METHODS``.
         conditions: what the motion will respect; by default nothing but forward acceleration.
+        intervals: factors on damping and stiffness; by default the object's values are exact.
 
     Raises:
         CertificateError: unknown method, an undamped object, or conditions that leave no room.
         ParameterError: σ out of range.
     """
-    require_instance("beam", beam, BeamParams)
+    if not isinstance(deformable, LinearizedObject):
+        require_instance("beam", deformable, BeamParams)
     validated_sigma(sigma_rad)
-    require_choice("method", method, tuple(_METHODS), CertificateError)
-    conditions = conditions or CertificateConditions()
-    linear = linearize(beam)
-    if not is_hurwitz(linear.A_u):
-        raise CertificateError(
-            "damping",
-            (beam.damping, beam.joint_damping),
-            "damping that makes A_u of Eq. (16) Hurwitz",
-            "A small periodic motion drives an undamped object to any swing; add damping.",
-        )
-    certificate = _METHODS[method](beam, linear, sigma_rad, conditions)
+    require_choice("method", method, CERTIFICATE_METHODS, CertificateError)
+    conditions, intervals = conditions or CertificateConditions(), intervals or EXACT_PARAMETERS
+    linear = linearize(deformable) if isinstance(deformable, BeamParams) else deformable
+    _require_damping(linear, intervals)
+    _require_yaw_is_allowed(linear, conditions)
+    _require_unloaded_springs(linear, intervals)
+    worst = linear_limit(linear, sigma_rad, method, conditions, intervals)
+    if _is_one_hinge(deformable) and method != "tanner_printed":
+        # there the nonlinear limit is exact, so that nothing more than it need be claimed
+        limit = nonlinear_limit(deformable, sigma_rad, conditions, intervals)
+        worst = replace(worst, bound=min(worst.bound, limit))
+    certificate = Certificate(
+        method=method,
+        sigma_rad=sigma_rad,
+        deformable=deformable,
+        nu_max=worst.bound,
+        acceleration_bound=worst.bound - conditions.acceleration_error_m_s2,
+        speed_bound=math.inf,
+        conditions=conditions,
+        intervals=intervals,
+        worst_factors=(worst.damping, worst.stiffness),
+    )
+    if method in SHARED_WITH_SPEED:
+        certificate = _shared_with_speed(certificate)
     if not certificate.acceleration_bound > 0:
         raise CertificateError(
             "acceleration_bound",
@@ -137,113 +218,65 @@ def certify(
     return certificate
 
 
-def nu_max_tanner(
-    linear: LinearizedObject, deformation_budget_rad: float, *, printed: bool
-) -> float:
-    """Return ν_max of Eq. (18) in m/s².
+def _is_one_hinge(deformable: Deformable) -> TypeGuard[BeamParams]:
+    return isinstance(deformable, BeamParams) and deformable.segment_count == 1
 
-    Args:
-        linear: the linearization (16).
-        deformation_budget_rad: σ − sup‖z2*‖∞.
-        printed: with the radical as printed instead of the one that follows from Eq. (21).
+
+def _share_a_factor(pairs: _Pairs, low: float, high: float) -> bool:
+    """Whether one factor within [low, high] turns every second number into the first."""
+    factors = [true / certified for true, certified in pairs if certified > 0]
+    nothing_new = all(true == 0 for true, certified in pairs if certified == 0)
+    rounding = 1e-9
+    return nothing_new and all(
+        low - rounding <= factor <= high + rounding and abs(factor - factors[0]) <= rounding
+        for factor in factors
+    )
+
+
+def _shared_with_speed(certificate: Certificate) -> Certificate:
+    """Split ν_max by Eq. (19) with s = sup‖ż1‖∞ = ν_max / 2, the paper's choice in Section VI.
+
+    ν counts lifting too. What lifting does to the stiffness, which B_u does not know, is covered by
+    the slack: this bound is 4 N² times smaller than ``lyapunov``.
     """
-    smallest, largest = np.linalg.eigvalsh(lyapunov_matrix(linear.A_u))[[0, -1]]
-    radical = math.sqrt(largest / smallest if printed else smallest / largest)
-    input_gain = np.linalg.norm(linear.B_u, 2)  # λ_M(B_u) = √λ_max(B_u B_uᵀ)
-    return float(deformation_budget_rad / (8 * linear.count**2 * largest * input_gain) * radical)
-
-
-def stiffness_gain(linear: LinearizedObject, perturbation: Array) -> Array:
-    """Return sup|z2_k| per unit of a stiffness perturbation and of ‖z2‖∞ ≤ σ, shape (N,)."""
-    C = np.eye(linear.count, 2 * linear.count)
-    return peak_gains(linear.A_u, perturbation, C).sum(axis=1)
-
-
-def _tanner(
-    beam: BeamParams,
-    linear: LinearizedObject,
-    sigma_rad: float,
-    conditions: CertificateConditions,
-    *,
-    printed: bool = False,
-) -> Certificate:
-    smallest, largest = np.linalg.eigvalsh(lyapunov_matrix(linear.A_u))[[0, -1]]
-    start = conditions.initial_swing_rad * math.sqrt(linear.count * largest / smallest)
-    # Eq. (16) is the motion without yaw; small gain adds what the centrifugal stiffness brings
-    turning = conditions.yaw_rate_rad_s**2 * stiffness_gain(linear, linear.centrifugal_stiffness)
-    rest = float(np.abs(equilibrium(beam)).max())
-    budget = sigma_rad * float(1.0 - turning.max()) - rest - start
-    nu_max = nu_max_tanner(linear, budget, printed=printed)
-    # Eq. (19) with s = sup‖ż1‖∞ = ν_max / 2, the paper's choice in Section VI
-    half = max(nu_max, 0.0) / 2
-    return Certificate(
-        method="tanner_printed" if printed else "tanner",
-        is_proven=not printed,
-        sigma_rad=sigma_rad,
-        beam=beam,
-        nu_max=nu_max,
-        acceleration_bound=half,
-        speed_bound=half,
-        conditions=CertificateConditions(
-            vertical_acceleration_m_s2=half,
-            yaw_rate_rad_s=conditions.yaw_rate_rad_s,
-            initial_swing_rad=conditions.initial_swing_rad,
-        ),
+    half = certificate.nu_max / 2
+    conditions = replace(
+        certificate.conditions,
+        vertical_acceleration_m_s2=half,
+        acceleration_error_m_s2=0.0,
+        vertical_error_m_s2=0.0,
     )
+    return replace(certificate, acceleration_bound=half, speed_bound=half, conditions=conditions)
 
 
-def _tanner_printed(
-    beam: BeamParams,
-    linear: LinearizedObject,
-    sigma_rad: float,
-    conditions: CertificateConditions,
-) -> Certificate:
-    return _tanner(beam, linear, sigma_rad, conditions, printed=True)
+def _require_damping(linear: LinearizedObject, intervals: ParameterIntervals) -> None:
+    weakest = linear.scaled(damping=intervals.damping[0], stiffness=intervals.stiffness[0])
+    if not is_hurwitz(weakest.A_u):
+        raise CertificateError(
+            "damping",
+            weakest.d_o22.tolist(),
+            "damping that makes A_u of Eq. (16) Hurwitz",
+            "A small periodic motion drives an undamped object to any swing; add damping.",
+        )
 
 
-def _l1(
-    beam: BeamParams,
-    linear: LinearizedObject,
-    sigma_rad: float,
-    conditions: CertificateConditions,
-) -> Certificate:
-    """Exact peak gain; vertical acceleration and yaw enter as bounded stiffness perturbations.
-
-    With |φ_k| ≤ σ they act like inputs of known size (small gain), whatever their time course.
-    """
-    count = linear.count
-    C = np.eye(count, 2 * count)
-    inputs = np.hstack(
-        (linear.forward_input[:, None], linear.vertical_stiffness, linear.centrifugal_stiffness)
-    )
-    gains = peak_gains(linear.A_u, inputs, C)
-    forward = gains[:, 0]
-    vertical = gains[:, 1 : 1 + count].sum(axis=1)
-    centrifugal = gains[:, 1 + count :].sum(axis=1)
-    budget = sigma_rad * (
-        1.0
-        - conditions.vertical_acceleration_m_s2 * vertical
-        - conditions.yaw_rate_rad_s**2 * centrifugal
-    )
-    if conditions.initial_swing_rad > 0:
-        start = np.concatenate((np.full(count, conditions.initial_swing_rad), np.zeros(count)))
-        budget = budget - peak_free_response(linear.A_u, start, C)
-    nu_max = float((budget / forward).min())
-    return Certificate(
-        method="l1",
-        is_proven=True,
-        sigma_rad=sigma_rad,
-        beam=beam,
-        nu_max=nu_max,
-        acceleration_bound=nu_max - conditions.acceleration_error_m_s2,
-        speed_bound=math.inf,
-        conditions=conditions,
-    )
+def _require_yaw_is_allowed(linear: LinearizedObject, conditions: CertificateConditions) -> None:
+    if linear.is_excited_by_yaw and conditions.yaw_rate_rad_s > 0:
+        raise CertificateError(
+            "yaw_rate_rad_s",
+            conditions.yaw_rate_rad_s,
+            "0 for an object that turning itself deforms",
+            "Carry it without turning, or hold it so that it hangs in the plane of motion.",
+        )
 
 
-_METHODS: dict[
-    str,
-    Callable[[BeamParams, LinearizedObject, float, CertificateConditions], Certificate],
-] = {"tanner": _tanner, "tanner_printed": _tanner_printed, "l1": _l1}
-
-CERTIFICATE_METHODS = tuple(_METHODS)
+def _require_unloaded_springs(linear: LinearizedObject, intervals: ParameterIntervals) -> None:
+    """Raise where another stiffness would move the equilibrium: gravity then loads the springs."""
+    weight = np.abs(linear.m_o12[2]).max() * GRAVITY_M_S2
+    if intervals.stiffness != EXACT_PARAMETERS.stiffness and weight > _NEGLIGIBLE_TORQUE:
+        raise CertificateError(
+            "intervals.stiffness",
+            intervals.stiffness,
+            "(1.0, 1.0) for an object whose springs carry its weight",
+            "Certify it at each end of the interval, or hold it so that it hangs straight.",
+        )

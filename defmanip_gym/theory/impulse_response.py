@@ -11,12 +11,14 @@ from scipy.linalg import expm
 
 from defmanip_gym.theory.chain import Array
 
-_SAMPLES_PER_PERIOD = 400
-_DECAYS_OF_A_MODE = 30.0  # a mode counts until it has shrunk by e⁻³⁰
+_SAMPLES_PER_PERIOD = 200
+_DECAYS_OF_A_MODE = 16.0  # a mode counts until it has shrunk by e⁻¹⁶
 _BLOCK = 1024
 
 
-def peak_gains(A: Array, B: Array, C: Array) -> Array:
+def peak_gains(
+    A: Array, B: Array, C: Array, *, samples_per_period: int = _SAMPLES_PER_PERIOD
+) -> Array:
     """Return ∫₀^∞ |C e^{At} B| dt elementwise: the exact peak-to-peak gains.
 
     |y_i(t)| ≤ Σ_j gain_ij · sup|u_j| for η̇ = A η + B u, y = C η from rest, and a bang-bang input
@@ -27,26 +29,41 @@ def peak_gains(A: Array, B: Array, C: Array) -> Array:
         A: (k, k), Hurwitz.
         B: (k, inputs).
         C: (outputs, k).
+        samples_per_period: of the fastest mode; fewer are faster and round up more.
 
     Returns:
         (outputs, inputs).
     """
     total = np.zeros((C.shape[0], B.shape[1]))
-    for period, response in _sampled_response(A, B, C):
+    for period, response in _sampled_response(A, B, C, samples_per_period):
         magnitude = np.abs(response)
         total += period * (magnitude.sum(axis=0) - 0.5 * (magnitude[0] + magnitude[-1]))
-    return total * (1 + (2 * np.pi / _SAMPLES_PER_PERIOD) ** 2 / 12)
+    return total * (1 + (2 * np.pi / samples_per_period) ** 2 / 12)
 
 
-def peak_free_response(A: Array, start: Array, C: Array) -> Array:
-    """Return sup_t |C e^{At} start| for each output, shape (outputs,); β in Eq. (15)."""
+def peak_free_response(A: Array, starts: Array, C: Array) -> Array:
+    """Return sup_t Σ_j |C e^{At} s_j| over the columns s_j, shape (outputs,); β in Eq. (15).
+
+    That is the largest |C η(t)| over all initial states Σ_j r_j s_j with |r_j| ≤ 1.
+
+    Args:
+        A: (k, k), Hurwitz.
+        starts: (k, columns); zero columns are skipped.
+        C: (outputs, k).
+    """
     peak = np.zeros(C.shape[0])
-    for _, response in _sampled_response(A, start[:, None], C):
-        peak = np.maximum(peak, np.abs(response[..., 0]).max(axis=0))
-    return peak
+    used = np.flatnonzero(np.abs(starts).max(axis=0))
+    if not len(used):
+        return peak
+    for _, response in _sampled_response(A, starts[:, used], C, _SAMPLES_PER_PERIOD):
+        peak = np.maximum(peak, np.abs(response).sum(axis=-1).max(axis=0))
+    # a peak between two samples rises by (ωT/2)²/2 at most
+    return peak * (1 + (np.pi / _SAMPLES_PER_PERIOD) ** 2 / 2)
 
 
-def _sampled_response(A: Array, B: Array, C: Array) -> Iterator[tuple[float, Array]]:
+def _sampled_response(
+    A: Array, B: Array, C: Array, samples_per_period: int
+) -> Iterator[tuple[float, Array]]:
     """Yield sampling periods and blocks of C e^{At} B that join end to end.
 
     The period follows the fastest mode that is still alive, so that a stiff object's quickly
@@ -54,7 +71,7 @@ def _sampled_response(A: Array, B: Array, C: Array) -> Iterator[tuple[float, Arr
     """
     begin, state = 0.0, B
     for end, speed in _stages(np.linalg.eigvals(A)):
-        longest = 2 * np.pi / speed / _SAMPLES_PER_PERIOD
+        longest = 2 * np.pi / speed / samples_per_period
         blocks = max(1, int(np.ceil((end - begin) / longest / _BLOCK)))
         period = (end - begin) / (blocks * _BLOCK)
         outputs = C @ _powers(expm(A * period), _BLOCK + 1)

@@ -66,7 +66,7 @@ class HangingBeam:
             raise ParameterError("damping", damping, "a finite number", "Give N m s/rad.")
         # d_o21 = k_o21 = 0: damper and springs are tied to the vertical and to one another
         self.d_o22 = segment_coupling(self.count, root_damping, beam.joint_damping)
-        self.k_o22 = segment_coupling(self.count, 0.0, beam.joint_stiffness)
+        self.k_o22 = segment_coupling(self.count, beam.root_stiffness, beam.joint_stiffness)
 
     def partition(self, swing: Array, swing_rate: Array, yaw_rate: Array) -> ObjectPartition:
         """Return the terms of Eq. (6).

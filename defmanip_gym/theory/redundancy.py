@@ -16,6 +16,20 @@ from defmanip_gym.theory.robot_model import ArmKinematics
 from defmanip_gym.validation import require_positive
 
 
+def task_planes(base_jacobian: Array) -> tuple[Array, Array]:
+    """Return the projections S_b, S_a of Section IV.B, (..., 3, 3) each.
+
+    The print takes range and kernel of J_Abᵀ and J_Ab, which lie in the space of (u1, u2), where
+    S_b w has no meaning. In the task space S_b projects on range(J_Ab), what the base can do, and
+    S_a on its complement, what only the arm can do.
+
+    Args:
+        base_jacobian: J_Ab, the first two columns of J_A, (..., 3, 2).
+    """
+    S_b = base_jacobian @ np.linalg.pinv(base_jacobian)
+    return S_b, np.eye(base_jacobian.shape[-2]) - S_b
+
+
 class RedundancyResolution:
     """Turns a task-space acceleration into accelerations of base and arm.
 

@@ -14,6 +14,8 @@ from defmanip_gym.theory.chain import Array, YawingChain, arm_links, beam_links
 # α̇ = JOINT_TO_PITCH q̇_a for the two joints of the arm
 JOINT_TO_PITCH = np.array([[1.0, 0.0], [1.0, 1.0]])
 PITCH_TO_JOINT = np.linalg.inv(JOINT_TO_PITCH)
+# (u1, u2, α̇) = QUASI_TO_PITCH u for the quasi-velocities u = (u1, u2, q̇_a)
+QUASI_TO_PITCH = np.block([[np.eye(2), np.zeros((2, 2))], [np.zeros((2, 2)), JOINT_TO_PITCH]])
 
 
 class ArmKinematics:
@@ -63,6 +65,21 @@ class ArmKinematics:
         jacobian[..., 2, 2:] = arm[..., 1, :]
         return jacobian
 
+    def task_bias_acceleration(
+        self, pitch: Array, pitch_rate: Array, base_velocity: Array
+    ) -> Array:
+        """Return J̇_A u, shape (..., 3) m/s²: the grasp's inertial acceleration at u̇ = 0.
+
+        Base frame, so it holds what turning the frame adds: ẍ_a = J_A u̇ + J̇_A u is inertial.
+        """
+        u1, u2 = base_velocity[..., 0], base_velocity[..., 1]
+        reach = self.reach_and_height(pitch)[..., 0]
+        reach_rate = (self.jacobian(pitch)[..., 0, :] * pitch_rate).sum(-1)
+        bias = self.bias_acceleration(pitch, pitch_rate)
+        return np.stack(
+            (bias[..., 0] - reach * u2**2, 2 * reach_rate * u2 + u1 * u2, bias[..., 1]), axis=-1
+        )
+
 
 def robot_chain(robot: RobotParams, beam: BeamParams | None = None) -> YawingChain:
     """Return the chain of the robot alone, Eq. (2), or carrying the beam, Eq. (7)."""
@@ -77,12 +94,19 @@ def robot_chain(robot: RobotParams, beam: BeamParams | None = None) -> YawingCha
     )
 
 
-def task_inertia(robot: RobotParams, pitch: Array) -> Array:
-    """Return 𝓜 = (J_A M_r⁻¹ J_Aᵀ)⁻¹ of Eq. (4) in the base frame, shape (..., 3, 3), kg."""
+def robot_dynamics(
+    robot: RobotParams, pitch: Array, pitch_rate: Array, base_velocity: Array
+) -> tuple[Array, Array]:
+    """Return M_r, (..., 4, 4), and C_r with gravity, (..., 4), of Eq. (2) for u = (u1, u2, q̇_a).
+
+    Args:
+        robot: the robot alone, without an object.
+        pitch: α of the arm, (..., 2) rad.
+        pitch_rate: α̇, (..., 2) rad/s.
+        base_velocity: (u1, u2), (..., 2) m/s, rad/s.
+    """
     chain = robot_chain(robot)
-    to_pitch = np.eye(4)
-    to_pitch[2:, 2:] = JOINT_TO_PITCH
-    inertia = to_pitch.T @ chain.mass_matrix(pitch) @ to_pitch
-    jacobian = ArmKinematics(robot).task_jacobian(pitch)
-    mobility = jacobian @ np.linalg.inv(inertia) @ np.swapaxes(jacobian, -1, -2)
-    return np.asarray(np.linalg.inv(mobility), dtype=np.float64)
+    terms = chain.terms(pitch, pitch_rate)
+    velocity = np.concatenate((base_velocity, pitch_rate), axis=-1)
+    inertia = QUASI_TO_PITCH.T @ chain.mass_matrix(pitch, terms) @ QUASI_TO_PITCH
+    return inertia, chain.bias(pitch, velocity, terms) @ QUASI_TO_PITCH

@@ -16,7 +16,7 @@ from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.control_laws import ForceLoopGains
 from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.robot_model import task_inertia
+from defmanip_gym.theory.task_space import task_inertia
 
 
 def smallest_k2(tracking_gain: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -74,10 +74,10 @@ class ActionScaling:
                 "'task'",
                 "A certificate bounds the task acceleration; make the environment in task mode.",
             )
-        if certificate.beam.segment_count != config.beam.segment_count:
+        if certificate.coordinate_count != config.beam.segment_count:
             raise CertificateError(
-                "certificate.beam.segment_count",
-                certificate.beam.segment_count,
+                "certificate.coordinate_count",
+                certificate.coordinate_count,
                 f"{config.beam.segment_count}, as in the environment",
                 "Compute the certificate for the environment's beam.",
             )
@@ -99,8 +99,7 @@ class ActionScaling:
     def begin(self, observation: Array, started: BoolArray) -> BoolArray:
         """Forget the past of episodes that start; return whether the certificate covers these.
 
-        It does when the true beam is the certified one, with at least its damping, and starts
-        within the certified swing.
+        It does when it covers the true beam and the episode starts within its initial swing.
 
         Args:
             observation: first observations, (n, size); rows that do not start are not looked at.
@@ -109,13 +108,9 @@ class ActionScaling:
         if not hasattr(self, "_memory"):
             self._memory = _LastPeriod.at_rest(len(started))
         self._memory.known[started] = False
-        beam, certified = self._config.beam, self._certificate.beam
-        same_beam = beam.damping >= certified.damping and certified == replace(
-            beam, damping=certified.damping
-        )
         swing = np.abs(self._layout.part(observation, "swing")).max(axis=1)
         limit = self._certificate.conditions.initial_swing_rad + _ROUNDING
-        return np.asarray(same_beam & (swing <= limit))
+        return np.asarray(self._certificate.covers(self._config.beam) & (swing <= limit))
 
     def scale(self, actions: Array, observation: Array) -> tuple[Array, Array]:
         """Return certified actions (n, 3) and by how much w changed, (n,) m/s².

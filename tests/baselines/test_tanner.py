@@ -129,5 +129,5 @@ def test_certificates_without_room_to_lift_or_turn_are_refused():
     narrow = certify(BeamParams(), conditions=CertificateConditions(initial_swing_rad=0.01))
     with pytest.raises(CertificateError, match="TRANSPORT_CONDITIONS"):
         TannerController(certificate=narrow)
-    with pytest.raises(CertificateError, match="segment_count"):
+    with pytest.raises(CertificateError, match="coordinate_count"):
         TannerController(beam=BeamParams(segment_count=2), certificate=L1)

@@ -5,8 +5,9 @@ from hypothesis import strategies as st
 
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import RobotParams
-from defmanip_gym.theory.redundancy import RedundancyResolution
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics, task_inertia
+from defmanip_gym.theory.redundancy import RedundancyResolution, task_planes
+from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.task_space import task_inertia
 
 ROBOT = RobotParams()
 ARM = ArmKinematics(ROBOT)
@@ -75,6 +76,31 @@ def test_task_inertia_is_symmetric_positive_and_decouples_the_lateral_axis(seed)
     np.testing.assert_allclose(inertia, inertia.T, rtol=1e-6, atol=1e-9)
     assert np.linalg.eigvalsh(inertia)[0] > 0
     np.testing.assert_allclose(inertia[1, [0, 2]], 0.0, atol=1e-9)
+
+
+@given(st.integers(0, 10**6))
+def test_base_spans_the_horizontal_plane_and_the_arm_what_is_left(seed):
+    pitch = random_arm(seed)[0]
+    base_jacobian = ARM.task_jacobian(pitch)[:, :2]
+    S_b, S_a = task_planes(base_jacobian)
+    np.testing.assert_allclose(S_b, np.diag([1.0, 1.0, 0.0]), atol=1e-12)
+    np.testing.assert_allclose(S_a, np.diag([0.0, 0.0, 1.0]), atol=1e-12)
+    np.testing.assert_allclose(S_b @ base_jacobian, base_jacobian, atol=1e-12)
+
+
+@given(st.integers(0, 10**6))
+def test_base_does_s_b_w_and_arm_s_a_w_once_the_reach_has_settled(seed):
+    rng = np.random.default_rng(seed)
+    shoulder = rng.uniform(0.9, 1.5)
+    # elbow placed so that the reach is the goal's
+    elbow = -np.arccos((0.7 - 0.6 * np.cos(shoulder)) / 0.7)
+    pitch, still, w = np.array([shoulder, elbow]), np.zeros(2), rng.normal(size=3)
+    S_b, S_a = task_planes(ARM.task_jacobian(pitch)[:, :2])
+    accelerations = RESOLUTION.accelerations(w, pitch, still, still)
+    jacobian = ARM.task_jacobian(pitch)
+    np.testing.assert_allclose(jacobian[:, :2] @ accelerations[:2], S_b @ w, atol=1e-9)
+    arm = ARM.jacobian(pitch) @ accelerations[2:]
+    np.testing.assert_allclose([arm[0], 0.0, arm[1]], S_a @ w, atol=1e-9)
 
 
 @pytest.mark.parametrize("bad", [{"goal_reach_m": 0.0}, {"goal_reach_m": 0.7, "k": -1}])

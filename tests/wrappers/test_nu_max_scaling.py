@@ -167,7 +167,7 @@ def test_wrapped_environment_passes_gymnasiums_check():
 def test_certificates_that_do_not_fit_are_refused():
     with pytest.raises(CertificateError, match="task"):
         NuMaxActionScaling(gymnasium.make(ENV_ID, control_mode="force"), L1)
-    with pytest.raises(CertificateError, match="segment_count"):
+    with pytest.raises(CertificateError, match="coordinate_count"):
         NuMaxActionScaling(gymnasium.make(ENV_ID, beam=BeamParams(segment_count=2)), L1)
     with pytest.raises(CertificateError, match="sigma"):
         NuMaxActionScaling(gymnasium.make(ENV_ID, sigma_rad=0.3), L1)

@@ -1,0 +1,1 @@
+"""Objects to carry: from model files, ready for certificates and for the rig."""

@@ -1,0 +1,1 @@
+"""The paper's simulation (Section VI) on the MuJoCo plant: ``defmanip reproduce``."""
