@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import tyro
 from rich.console import Console
 
+from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.errors import DefmanipError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
 from defmanip_gym.reproduction.config import ReproductionConfig
@@ -23,6 +24,7 @@ def main() -> None:
     commands: dict[str, Callable[..., Any]] = {
         "train": TrainConfig,
         "compare": ComparisonConfig,
+        "certify": CertifyConfig,
         "reproduce": ReproductionConfig,
     }
     _guarded(
@@ -59,6 +61,10 @@ def _run(config: object) -> None:
 
         folder = train(config)
         print(f"Run folder: {folder}")
+    elif isinstance(config, CertifyConfig):
+        from defmanip_gym.certification.command import run_certify  # as does matplotlib
+
+        run_certify(config)
     elif isinstance(config, ReproductionConfig):
         from defmanip_gym.reproduction.reproduce import run_reproduction  # matplotlib, too
 

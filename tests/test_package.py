@@ -23,7 +23,7 @@ LAYERS = [
     {"wrappers"},
     {"baselines"},
     {"evaluation"},
-    {"reproduction"},
+    {"reproduction", "certification"},
     {"training"},
     {"cli", "__main__"},
 ]

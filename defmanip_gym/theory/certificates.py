@@ -5,7 +5,8 @@
 ``tanner``         Eq. (18) with the radical that Eq. (21) implies, √(λ_m/λ_M)
 ``lyapunov``       the same P without the slack of norm conversions
 ``ellipsoid``      the best invariant ellipsoid
-``l1``             σ / ∫|C e^{At} B| dt, which no smaller bound on the linear model can beat
+``l1``             σ / ∫|C e^{At} B| dt, the largest bound that the linear model allows
+``phase_plane``    for one hinge: the largest bound that the nonlinear object allows
 =================  ==================================================================
 
 Every rung treats lifting, turning, initial states and intervals of parameters the same way
@@ -31,10 +32,13 @@ from defmanip_gym.theory.conditions import (
 )
 from defmanip_gym.theory.limits import (
     CERTIFICATE_METHODS,
+    PHASE_PLANE,
     SHARED_WITH_SPEED,
     linear_limit,
     nonlinear_limit,
 )
+from defmanip_gym.theory.phase_plane import one_hinge_stays
+from defmanip_gym.theory.worst_case import WorstCase
 from defmanip_gym.theory.zero_dynamics import LinearizedObject, is_hurwitz, linearize
 from defmanip_gym.validation import require_choice, require_instance
 
@@ -190,11 +194,12 @@ def certify(
     _require_damping(linear, intervals)
     _require_yaw_is_allowed(linear, conditions)
     _require_unloaded_springs(linear, intervals)
-    worst = linear_limit(linear, sigma_rad, method, conditions, intervals)
-    if _is_one_hinge(deformable) and method != "tanner_printed":
-        # there the nonlinear limit is exact, so that nothing more than it need be claimed
-        limit = nonlinear_limit(deformable, sigma_rad, conditions, intervals)
-        worst = replace(worst, bound=min(worst.bound, limit))
+    if method == PHASE_PLANE:
+        worst = _phase_plane(deformable, sigma_rad, conditions, intervals)
+    else:
+        worst = linear_limit(linear, sigma_rad, method, conditions, intervals)
+        if _is_one_hinge(deformable) and method != "tanner_printed":
+            worst = _within_the_nonlinear_limit(worst, deformable, sigma_rad, conditions, intervals)
     certificate = Certificate(
         method=method,
         sigma_rad=sigma_rad,
@@ -230,6 +235,40 @@ def _share_a_factor(pairs: _Pairs, low: float, high: float) -> bool:
     return nothing_new and all(
         low - rounding <= factor <= high + rounding and abs(factor - factors[0]) <= rounding
         for factor in factors
+    )
+
+
+def _within_the_nonlinear_limit(
+    worst: WorstCase,
+    beam: BeamParams,
+    sigma_rad: float,
+    conditions: CertificateConditions,
+    intervals: ParameterIntervals,
+) -> WorstCase:
+    """Lower a linear bound where it exceeds what the nonlinear hinge allows, which is exact."""
+    if one_hinge_stays(beam, worst.bound, sigma_rad, conditions, intervals):
+        return worst
+    limit = nonlinear_limit(beam, sigma_rad, conditions, intervals)
+    return replace(worst, bound=min(worst.bound, limit))
+
+
+def _phase_plane(
+    deformable: Deformable,
+    sigma_rad: float,
+    conditions: CertificateConditions,
+    intervals: ParameterIntervals,
+) -> WorstCase:
+    if not _is_one_hinge(deformable):
+        raise CertificateError(
+            "method",
+            PHASE_PLANE,
+            "an object with one hinge: BeamParams(segment_count=1)",
+            'Use method="l1" for objects with more coordinates and for model files.',
+        )
+    return WorstCase(
+        bound=nonlinear_limit(deformable, sigma_rad, conditions, intervals),
+        damping=intervals.damping[0],
+        stiffness=intervals.stiffness[0],
     )
 
 

@@ -36,7 +36,8 @@ _PEAK_BOUNDS: dict[str, PeakBound] = {
 SHARED_WITH_SPEED = ("tanner", "tanner_printed")
 
 _MOST_BOXES, _MOST_NONLINEAR_BOXES = 2000, 12
-CERTIFICATE_METHODS = tuple(_PEAK_BOUNDS)
+PHASE_PLANE = "phase_plane"
+CERTIFICATE_METHODS = (*_PEAK_BOUNDS, PHASE_PLANE)
 
 
 def linear_limit(

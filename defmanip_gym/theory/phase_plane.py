@@ -21,6 +21,17 @@ _LARGEST_ACCELERATION_M_S2 = 100.0
 _ROUNDED_DOWN = 1 - 2e-5  # more than the errors of integration and root finding
 
 
+def one_hinge_stays(
+    beam: BeamParams,
+    acceleration_m_s2: float,
+    sigma_rad: float,
+    conditions: CertificateConditions,
+    box: ParameterIntervals,
+) -> bool:
+    """Whether |φ| ≤ σ under every forward acceleration up to a bound; see ``one_hinge_limit``."""
+    return _Adversary(beam, acceleration_m_s2, conditions, box).is_contained(sigma_rad)
+
+
 def one_hinge_limit(
     beam: BeamParams,
     sigma_rad: float,
@@ -37,7 +48,7 @@ def one_hinge_limit(
     """
 
     def stays(acceleration: float) -> bool:
-        return _Adversary(beam, acceleration, conditions, box).is_contained(sigma_rad)
+        return one_hinge_stays(beam, acceleration, sigma_rad, conditions, box)
 
     if not stays(0.0):
         return 0.0

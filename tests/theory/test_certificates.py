@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -14,6 +14,7 @@ from defmanip_gym.theory.certificates import (
     CertificateConditions,
     certify,
 )
+from defmanip_gym.theory.peak_bounds import resonant_limit
 from defmanip_gym.theory.zero_dynamics import linearize
 
 SIGMA = math.pi / 6
@@ -156,3 +157,45 @@ def test_worst_input_of_the_linear_model_attains_sigma(segments):
         responses[k], state = state[:segments], step[:-1, :-1] @ state
     reached = bound * np.abs(responses).sum(axis=0)  # the input sign(response) read backwards
     assert 0.98 * SIGMA < reached.max() < 1.001 * SIGMA
+
+
+@pytest.mark.parametrize(("damping", "limit"), [(1.0, 2.204), (0.1, 0.225)])
+def test_phase_plane_is_the_true_limit_of_one_hinge(damping, limit):
+    certificate = certify(BeamParams(damping=damping), method="phase_plane")
+    assert certificate.nu_max == pytest.approx(limit, rel=0.002)
+    assert certificate.proof == "nonlinear"
+
+
+def test_phase_plane_leaves_more_room_for_lifting_and_turning_than_small_gain():
+    exact = certify(PLANT, method="phase_plane", conditions=TRANSPORT_CONDITIONS)
+    assert exact.acceleration_bound > 1.25 * certify(PLANT, conditions=TRANSPORT_CONDITIONS).nu_max
+
+
+def test_phase_plane_is_refused_for_more_than_one_hinge():
+    with pytest.raises(CertificateError, match="one hinge"):
+        certify(BeamParams(segment_count=2), method="phase_plane")
+
+
+def test_rungs_are_in_the_order_of_their_bounds():
+    beam = BeamParams(damping=0.4, segment_count=4, joint_stiffness=5.0)
+    ladder = ("tanner", "lyapunov", "ellipsoid", "l1")
+    bounds = [certify(beam, method=method).nu_max for method in ladder]
+    assert bounds == sorted(bounds)
+    assert bounds[-1] <= resonant_limit(linearize(beam), SIGMA)
+
+
+@settings(max_examples=15)
+@given(st.floats(0.01, 5.0), st.floats(0.1, 5.0), st.integers(1, 3), st.floats(0.0, 30.0))
+def test_tanner_covers_the_lifting_that_its_nu_counts(damping, mass, segments, stiffness):
+    beam = BeamParams(
+        mass_kg=mass,
+        damping=damping,
+        segment_count=segments,
+        joint_stiffness=stiffness,
+        joint_damping=damping / 5,
+    )
+    tanner = certify(beam, method="tanner")
+    lifted = CertificateConditions(
+        vertical_acceleration_m_s2=tanner.conditions.vertical_acceleration_m_s2
+    )
+    assert certify(beam, conditions=lifted).nu_max >= tanner.acceleration_bound

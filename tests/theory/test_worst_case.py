@@ -31,23 +31,33 @@ def scaled(beam, damping, stiffness):
     )
 
 
-@pytest.mark.parametrize("beam", [SPRUNG, THREE])
-@pytest.mark.parametrize("method", ["lyapunov", "ellipsoid", "l1"])
-def test_bound_over_an_interval_holds_for_every_object_in_it(beam, method):
-    over_all = certify(beam, method=method, intervals=WIDE).nu_max
-    rng = np.random.default_rng(0)
-    inside = np.vstack((rng.uniform((0.6, 0.8), (1.5, 1.2), (12, 2)), [(0.6, 0.8), (0.6, 1.2)]))
-    exact = min(certify(scaled(beam, *factors)).nu_max for factors in inside)
+@pytest.mark.parametrize(
+    ("beam", "method", "intervals"),
+    [
+        (SPRUNG, "lyapunov", WIDE),
+        (SPRUNG, "ellipsoid", WIDE),
+        (SPRUNG, "l1", WIDE),
+        (SPRUNG, "phase_plane", WIDE),
+        (THREE, "l1", ParameterIntervals(damping=(0.9, 1.1), stiffness=(0.95, 1.05))),
+    ],
+)
+def test_bound_over_an_interval_holds_for_every_object_in_it(beam, method, intervals):
+    over_all = certify(beam, method=method, intervals=intervals).nu_max
+    low, high = np.transpose((intervals.damping, intervals.stiffness))
+    inside = np.vstack((np.random.default_rng(0).uniform(low, high, (10, 2)), low, high))
+    rung = "phase_plane" if method == "phase_plane" else "l1"
+    exact = min(certify(scaled(beam, *factors), method=rung).nu_max for factors in inside)
     assert over_all <= exact
     if method == "l1":
         assert over_all > 0.85 * exact
 
 
 def test_conditions_and_intervals_add_up():
-    both = certify(SPRUNG, intervals=WIDE, conditions=TRANSPORT_CONDITIONS).nu_max
-    weakest = scaled(SPRUNG, 0.6, 0.8)
+    damping = ParameterIntervals(damping=(0.6, 1.5))
+    both = certify(SPRUNG, intervals=damping, conditions=TRANSPORT_CONDITIONS).nu_max
+    weakest = scaled(SPRUNG, 0.6, 1.0)
     assert 0.8 * both < both <= certify(weakest, conditions=TRANSPORT_CONDITIONS).nu_max
-    assert both < certify(SPRUNG, intervals=WIDE).nu_max
+    assert both < certify(SPRUNG, intervals=damping).nu_max
 
 
 def test_one_hinge_is_worst_at_its_weakest_damping():
@@ -57,7 +67,7 @@ def test_one_hinge_is_worst_at_its_weakest_damping():
     assert certificate.worst_factors[0] == pytest.approx(0.5, rel=0.05)
 
 
-@pytest.mark.parametrize("method", CERTIFICATE_METHODS)
+@pytest.mark.parametrize("method", [m for m in CERTIFICATE_METHODS if m != "phase_plane"])
 def test_an_interval_of_one_point_changes_nothing(method):
     point = ParameterIntervals(damping=(1.0, 1.0), stiffness=(1.0, 1.0))
     assert certify(THREE, method=method, intervals=point) == certify(THREE, method=method)
@@ -96,7 +106,7 @@ def test_intervals_that_are_none_are_refused(interval):
 
 
 def test_certificate_covers_the_beams_in_its_intervals_only():
-    certificate = certify(THREE, intervals=WIDE)
+    certificate = certify(THREE, method="tanner", intervals=WIDE)
     assert certificate.covers(scaled(THREE, 0.7, 1.1))
     assert not certificate.covers(scaled(THREE, 0.5, 1.0))
     assert not certificate.covers(scaled(THREE, 1.0, 1.3))

@@ -1,0 +1,1 @@
+"""The command ``defmanip certify``: the ladder of bounds for one object, attacked."""

@@ -1,0 +1,119 @@
+"""All rungs of the ladder for one object, and what attacking the tightest says about them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from defmanip_gym.attack.certificate import attack_certificate
+from defmanip_gym.attack.result import AttackResult
+from defmanip_gym.attack.target import Target, beam_target, mjcf_target
+from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.errors import CertificateError
+from defmanip_gym.objects.mjcf_object import mjcf_object
+from defmanip_gym.params import BeamParams
+from defmanip_gym.theory.certificates import (
+    CERTIFICATE_METHODS,
+    TRANSPORT_CONDITIONS,
+    Certificate,
+    certify,
+)
+from defmanip_gym.theory.conditions import CertificateConditions
+from defmanip_gym.theory.peak_bounds import resonant_limit
+from defmanip_gym.theory.zero_dynamics import LinearizedObject
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ladder:
+    """The certificates of one object.
+
+    Attributes:
+        linear: the object linearized.
+        conditions: what was asked of the motion.
+        certificates: by method; those that exist.
+        refusals: by method, why there is none.
+        resonant_limit: amplitude of the forward sinusoid that uses up σ of the linear object, m/s².
+        attack: on the tightest certificate, if asked for.
+        target: the object on its rig, as attacked.
+    """
+
+    linear: LinearizedObject
+    conditions: CertificateConditions
+    certificates: dict[str, Certificate]
+    refusals: dict[str, str]
+    resonant_limit: float
+    attack: AttackResult | None
+    target: Target
+
+    @property
+    def tightest(self) -> Certificate:
+        """The certificate with the largest bound that is one."""
+        proven = (c for c in self.certificates.values() if c.is_proven)
+        return max(proven, key=lambda certificate: certificate.acceleration_bound)
+
+    def tightness(self, certificate: Certificate) -> float | None:
+        """Return its bound over the smallest violating one; ``None`` without an attack."""
+        if self.attack is None or not certificate.is_proven:
+            return None
+        return certificate.acceleration_bound / self.attack.violating_bound
+
+
+def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder:
+    """Return the ladder for a configuration.
+
+    Args:
+        config: object, conditions and what else was asked for.
+        tell: is told what is going on.
+
+    Raises:
+        CertificateError: no method gives a certificate.
+        ObjectFileError: the model file cannot be used.
+    """
+    deformable: BeamParams | LinearizedObject
+    if config.mjcf is not None:
+        tell(f"reading {config.mjcf}")
+        thing = mjcf_object(config.mjcf, grasp_site=config.grasp_site)
+        deformable, target = thing.linear, mjcf_target(thing)
+    else:
+        deformable = config.beam
+        target = beam_target(deformable)
+    conditions = TRANSPORT_CONDITIONS if config.transport else config.conditions
+    certificates, refusals = {}, {}
+    for method in CERTIFICATE_METHODS:
+        tell(f"bound {method}")
+        try:
+            certificates[method] = certify(
+                deformable,
+                sigma_rad=config.sigma,
+                method=method,
+                conditions=conditions,
+                intervals=config.intervals,
+            )
+        except CertificateError as error:
+            refusals[method] = str(error)
+            last_refusal = error
+    if not any(certificate.is_proven for certificate in certificates.values()):
+        raise last_refusal
+    tell("nonlinear limit")
+    ladder = Ladder(
+        linear=target.linear,
+        conditions=conditions,
+        certificates=certificates,
+        refusals=refusals,
+        resonant_limit=_resonant_limit(target.linear, config.sigma),
+        attack=None,
+        target=target,
+    )
+    if not config.attack:
+        return ladder
+    tell("attack on the plant")
+    attack = attack_certificate(ladder.tightest, target=target, longest_s=config.longest_attack_s)
+    return Ladder(**{**vars(ladder), "attack": attack})
+
+
+def _resonant_limit(linear: LinearizedObject, sigma: float) -> float:
+    room = sigma - float(np.abs(linear.equilibrium).max())
+    return resonant_limit(linear, room) if linear.forward_input.any() else math.inf

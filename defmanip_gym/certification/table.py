@@ -1,0 +1,173 @@
+"""The ladder as text and numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.certification.ladder import Ladder
+from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, Certificate
+from defmanip_gym.theory.conditions import EXACT_PARAMETERS
+from defmanip_gym.version import __version__
+
+_NONE = "–"
+PROOFS = {
+    "nonlinear": "the nonlinear object",
+    "linear": "the linear object",
+    "none": "nothing",
+}
+
+
+def ladder_table(ladder: Ladder) -> Table:
+    """Return the table for the terminal."""
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("method", no_wrap=True)
+    for heading in ("ν_max\nm/s²", "times\ntanner", "acceleration\nm/s²", "tightness"):
+        table.add_column(heading, justify="right")
+    table.add_column("proven for\nthe object")
+    reference = ladder.certificates.get("tanner")
+    for method in CERTIFICATE_METHODS:
+        certificate = ladder.certificates.get(method)
+        if certificate is None:
+            table.add_row(method, *[_NONE] * 4, "no room left")
+            continue
+        table.add_row(
+            method,
+            f"{certificate.nu_max:.3e}",
+            _times(certificate, reference),
+            f"{certificate.acceleration_bound:.3e}",
+            _share(ladder.tightness(certificate)),
+            certificate.proof,
+        )
+    return table
+
+
+def remarks(ladder: Ladder) -> list[str]:
+    """Return what has to be said beside the table."""
+    certificate = ladder.tightest
+    lines = [
+        f"Each internal coordinate stays within σ = {certificate.sigma_rad:.4g} under "
+        f"{_conditions(ladder)}.",
+        *_intervals(certificate),
+        "tanner and tanner_printed share ν_max between speed and acceleration, as the paper does.",
+        _nonlinear_remark(certificate),
+        f"A forward sinusoid of {ladder.resonant_limit:.4g} m/s² at resonance takes the linear "
+        "object to σ from rest.",
+    ]
+    if ladder.attack is not None:
+        attack = ladder.attack
+        lines.append(
+            f"Attack on {certificate.method}: {attack.peak_at_bound / attack.sigma:.1%} of σ at "
+            f"its bound; smallest bound broken {attack.violating_bound:.4g} m/s² ({attack.method}, "
+            f"{attack.coordinate}, {attack.cpu_seconds:.0f} s)."
+        )
+        if attack.is_broken:
+            lines.append("BROKEN: do not rely on this certificate, and please report it.")
+    return lines
+
+
+def numbers(config: CertifyConfig, ladder: Ladder) -> dict[str, Any]:
+    """Return everything as JSON values."""
+    tightest = ladder.tightest
+    return {
+        "command": config.command,
+        "version": __version__,
+        "sigma": tightest.sigma_rad,
+        "conditions": vars(ladder.conditions),
+        "intervals": vars(tightest.intervals),
+        "coordinates": list(ladder.linear.coordinates),
+        "equilibrium": ladder.linear.equilibrium.tolist(),
+        "resonant_limit_m_s2": ladder.resonant_limit,
+        "certificates": {
+            method: _certificate_numbers(ladder, certificate)
+            for method, certificate in ladder.certificates.items()
+        },
+        "refusals": ladder.refusals,
+        "attack": _attack_numbers(ladder),
+    }
+
+
+def _certificate_numbers(ladder: Ladder, certificate: Certificate) -> dict[str, Any]:
+    speed = certificate.speed_bound
+    return {
+        "nu_max_m_s2": certificate.nu_max,
+        "acceleration_bound_m_s2": certificate.acceleration_bound,
+        "speed_bound_m_s": None if math.isinf(speed) else speed,
+        "vertical_acceleration_bound_m_s2": certificate.vertical_acceleration_bound,
+        "proof": certificate.proof,
+        "nonlinear_limit_m_s2": certificate.nonlinear_limit,
+        "worst_factors": list(certificate.worst_factors),
+        "tightness": ladder.tightness(certificate),
+    }
+
+
+def _attack_numbers(ladder: Ladder) -> dict[str, Any] | None:
+    attack = ladder.attack
+    if attack is None:
+        return None
+    violating = attack.violating_bound
+    return {
+        "on": ladder.tightest.method,
+        "peak_share_of_sigma": attack.peak_at_bound / attack.sigma,
+        "violating_bound_m_s2": violating if math.isfinite(violating) else None,
+        "method": attack.method,
+        "coordinate": attack.coordinate,
+        "is_broken": attack.is_broken,
+    }
+
+
+def _nonlinear_remark(certificate: Certificate) -> str:
+    limit = certificate.nonlinear_limit
+    if limit is None:
+        return "Of this object only the linearization is known: nothing is proven beyond it."
+    if limit == 0:
+        return "Nothing is proven for the nonlinear object under these conditions."
+    exact = " (exact)" if certificate.coordinate_count == 1 else ""
+    return f"Proven for the nonlinear object: accelerations up to {limit:.4g} m/s²{exact}."
+
+
+def _conditions(ladder: Ladder) -> str:
+    conditions = ladder.conditions
+    said = [
+        text.format(value)
+        for text, value in (
+            ("vertical acceleration up to {:g} m/s²", conditions.vertical_acceleration_m_s2),
+            ("yaw rates up to {:g} rad/s", conditions.yaw_rate_rad_s),
+            ("starts up to {:g} rad off rest", conditions.initial_swing_rad),
+            ("and up to {:g} rad/s fast", conditions.initial_swing_rate_rad_s),
+            ("accelerations off by up to {:g} m/s²", conditions.acceleration_error_m_s2),
+        )
+        if value > 0
+    ]
+    return ", ".join(["horizontal acceleration within the bound", *said]) + (
+        "" if said else " alone: from rest, level, without turning"
+    )
+
+
+def _intervals(certificate: Certificate) -> list[str]:
+    if certificate.intervals == EXACT_PARAMETERS:
+        return []
+    damping, stiffness = certificate.worst_factors
+    return [
+        f"Damping may be {_interval(certificate.intervals.damping)} and elastic stiffness "
+        f"{_interval(certificate.intervals.stiffness)} times the object's; the bound is smallest "
+        f"near {damping:.3g} and {stiffness:.3g}."
+    ]
+
+
+def _interval(interval: tuple[float, float]) -> str:
+    return f"[{interval[0]:g}, {interval[1]:g}]"
+
+
+def _times(certificate: Certificate, reference: Certificate | None) -> str:
+    if reference is None:
+        return _NONE
+    return f"{certificate.nu_max / reference.nu_max:.3g}"
+
+
+def _share(value: float | None) -> str:
+    return _NONE if value is None else f"{value:.2g}"

@@ -1,0 +1,92 @@
+"""``defmanip certify``: what it prints, writes and refuses."""
+
+import json
+import math
+import sys
+from importlib.resources import files
+
+import pytest
+
+from defmanip_gym.certification.command import run_certify
+from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.certification.ladder import compute_ladder
+from defmanip_gym.cli import main
+from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError
+from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
+
+HOSE = str(files("defmanip_gym.objects") / "examples" / "hose.xml")
+
+
+def ladder(**options):
+    return compute_ladder(CertifyConfig(**options), lambda _: None)
+
+
+def test_the_papers_beam_gets_the_whole_ladder_attacked(tmp_path, capsys):
+    run_certify(CertifyConfig(damping=1.0, output=tmp_path, longest_attack_s=5.0))
+    printed = capsys.readouterr().out
+    written = json.loads((tmp_path / "certificates.json").read_text())
+    assert set(written["certificates"]) == set(CERTIFICATE_METHODS)
+    assert written["certificates"]["tanner"]["nu_max_m_s2"] == pytest.approx(1.089e-3, rel=1e-4)
+    assert written["certificates"]["tanner_printed"]["proof"] == "none"
+    assert not written["attack"]["is_broken"]
+    assert 0.9 < written["certificates"]["l1"]["tightness"] < 1.0
+    assert "1.089e-03" in printed and "phase_plane" in printed
+    assert (tmp_path / "ladder.png").stat().st_size > 10_000
+
+
+def test_a_model_file_is_certified_by_name_of_its_grasp_site():
+    hose = ladder(mjcf=HOSE, attack=False)
+    assert hose.tightest.method == "l1"
+    assert "one hinge" in hose.refusals["phase_plane"]
+    assert {certificate.proof for certificate in hose.certificates.values()} == {"none", "linear"}
+
+
+def test_an_elastic_beam_is_described_by_its_bending_stiffness():
+    beam = CertifyConfig(bending_stiffness=0.4, segments=4, length=1.2, mass=0.5).beam
+    assert beam.segment_count == 4
+    assert beam.joint_stiffness == pytest.approx(0.4 / 0.3)
+    assert beam.root_stiffness == pytest.approx(2 * beam.joint_stiffness)
+
+
+def test_intervals_and_conditions_are_those_asked_for():
+    narrow = ladder(damping_interval=(0.5, 2.0), vertical_acceleration=0.05, attack=False)
+    assert narrow.tightest.intervals.damping == (0.5, 2.0)
+    assert narrow.tightest.conditions.vertical_acceleration_m_s2 == 0.05
+    assert narrow.tightest.nu_max < ladder(attack=False).tightest.nu_max
+
+
+def test_methods_without_room_are_left_out_with_their_reason():
+    transport = ladder(damping_interval=(0.5, 2.0), transport=True, attack=False)
+    assert "lyapunov" not in transport.certificates
+    assert "ask for less" in transport.refusals["lyapunov"]
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"damping": 0.0}, CertificateError),
+        ({"initial_swing": 0.6}, CertificateError),
+        ({"mjcf": "missing.xml"}, ObjectFileError),
+        ({"mjcf": HOSE, "grasp_site": "nowhere"}, ObjectFileError),
+        ({"segments": 0}, ParameterError),
+        ({"bending_stiffness": -1.0}, ParameterError),
+        ({"damping_interval": (2.0, 1.0)}, ParameterError),
+        ({"yaw_rate": math.nan}, ParameterError),
+    ],
+)
+def test_what_cannot_be_certified_is_refused_in_words(options, error):
+    with pytest.raises(error):
+        ladder(attack=False, **options)
+
+
+def test_wrong_options_end_without_a_traceback(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["defmanip", "certify", "--damping", "0", "--no-attack"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_the_command_repeats_what_differs_from_the_defaults():
+    config = CertifyConfig(damping=1.0, damping_interval=(0.5, 2.0), attack=False)
+    assert config.command == "defmanip certify --damping 1.0 --damping-interval 0.5 2.0 --no-attack"
