@@ -12,7 +12,7 @@ DOCS = Path(__file__).parent
 IMAGES = "images/reproduction/"
 
 if __name__ == "__main__":
-    results = run_reproduction(ReproductionConfig()).parent
+    results = run_reproduction(ReproductionConfig(fresh=True)).parent
     (DOCS / IMAGES).mkdir(parents=True, exist_ok=True)
     for path in (*sorted(results.glob("*.png")), results / NUMBERS_FILE):
         shutil.copyfile(path, DOCS / IMAGES / path.name)

@@ -141,11 +141,14 @@ class Simulation:
             ),
             axis=1,
         )
-        lever = (self._forearm_length_m - self._forearm_com_m) * np.stack(
-            (np.cos(pitch) * cos, np.cos(pitch) * sin, np.sin(pitch)), axis=1
-        )
-        self._external[:, self._forearm, :3] = force
-        self._external[:, self._forearm, 3:] = np.cross(lever, force)
+        arm = self._forearm_length_m - self._forearm_com_m
+        out, up = arm * np.cos(pitch), arm * np.sin(pitch)
+        external = self._external[:, self._forearm]
+        external[:, :3] = force
+        # lever × force by components: np.cross costs more than all the rest
+        external[:, 3] = out * sin * force[:, 2] - up * force[:, 1]
+        external[:, 4] = up * force[:, 0] - out * cos * force[:, 2]
+        external[:, 5] = out * (cos * force[:, 1] - sin * force[:, 0])
 
     def step(self, substeps: int) -> NDArray[np.bool_]:
         """Advance all simulations; return which of them diverged, (n,).
