@@ -218,7 +218,10 @@ def _acceleration_stiffness(forces: _InternalForces, z2: Array, axis: int) -> Ar
 
 
 def _is_excited_by_yaw(forces: _InternalForces, equilibrium: Array, mass: Array) -> bool:
-    """Whether u2² pushes at z2*, u2 couples to ż2, or u̇2 accelerates z2."""
+    """Whether u2² pushes at z2*, u2 couples to ż2, or u̇2 to z̈2, there or beside z2*.
+
+    u̇2 is not bounded by a certificate, so its torque must not grow with z2 either.
+    """
 
     def coriolis(rate: Array) -> Array:
         return forces(equilibrium, rate, yaw_rate_rad_s=1.0)
@@ -226,11 +229,10 @@ def _is_excited_by_yaw(forces: _InternalForces, equilibrium: Array, mass: Array)
     at_rest = forces(equilibrium, yaw_rate_rad_s=1.0) - forces(equilibrium)
     rest = np.zeros(forces.count)
     gyroscopic = _slope(coriolis, rest) - _slope(lambda rate: forces(equilibrium, rate), rest)
+    yaw_coupling = _slope(lambda z2: forces.mass_matrix(z2)[_YAW, _CARRIAGE:], equilibrium)
     inertia = np.abs(mass[_CARRIAGE:, _CARRIAGE:]).max()
-    return bool(
-        max(np.abs(at_rest).max(), np.abs(gyroscopic).max(), np.abs(mass[_YAW, _CARRIAGE:]).max())
-        > 1e-6 * inertia
-    )
+    couplings = (at_rest, gyroscopic, mass[_YAW, _CARRIAGE:], yaw_coupling)
+    return max(float(np.abs(coupling).max()) for coupling in couplings) > 1e-6 * inertia
 
 
 def _require_apparent_inertia(object_file: ObjectFile, linear: LinearizedObject) -> None:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import require_finite_sequence, require_non_negative
 
+_LARGEST_FACTOR = 1000.0
+_LARGEST_CONDITION = 1000.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class CertificateConditions:
@@ -30,7 +33,12 @@ class CertificateConditions:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            require_non_negative(name, getattr(self, name))
+            value = getattr(self, name)
+            require_non_negative(name, value)
+            if value > _LARGEST_CONDITION:
+                raise ParameterError(
+                    name, value, f"at most {_LARGEST_CONDITION:g}", "Nothing is carried like that."
+                )
 
 
 # Room for the transport task: 0.43 m of lifting, one turn of some 70 degrees, sampled starts, and
@@ -60,6 +68,7 @@ class ParameterIntervals:
         for name in self.__dataclass_fields__:
             interval = getattr(self, name)
             require_finite_sequence(name, interval, 2)
+            object.__setattr__(self, name, (float(interval[0]), float(interval[1])))
             if not 0 <= interval[0] <= interval[1] <= _LARGEST_FACTOR:
                 raise ParameterError(
                     name,
@@ -68,6 +77,11 @@ class ParameterIntervals:
                     "These are factors on the object's own values, for instance (0.5, 2.0).",
                 )
 
+    @property
+    def middle(self) -> ParameterIntervals:
+        """The point in the middle."""
+        damping, stiffness = (sum(ends) / 2 for ends in (self.damping, self.stiffness))
+        return ParameterIntervals(damping=(damping, damping), stiffness=(stiffness, stiffness))
 
-_LARGEST_FACTOR = 1000.0
+
 EXACT_PARAMETERS = ParameterIntervals()

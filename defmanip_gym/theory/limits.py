@@ -35,7 +35,8 @@ _PEAK_BOUNDS: dict[str, PeakBound] = {
 }
 SHARED_WITH_SPEED = ("tanner", "tanner_printed")
 
-_MOST_BOXES, _MOST_NONLINEAR_BOXES = 2000, 12
+_MOST_BOXES, _MOST_NONLINEAR_BOXES = 800, 12
+_MOST_PHASE_PLANES = 100
 PHASE_PLANE = "phase_plane"
 CERTIFICATE_METHODS = (*_PEAK_BOUNDS, PHASE_PLANE)
 
@@ -73,11 +74,16 @@ def _box_bound(
     inequality = peak_inequality(linear, box, conditions, bound)
     if inequality is None:
         return BoxBound(guaranteed=0.0, at_middle=0.0, damping_cost=1.0, stiffness_cost=0.0)
+    guaranteed = inequality.acceleration_bound(budget)
+    middle = guaranteed
+    if box != box.middle:
+        exact = peak_inequality(linear, box.middle, conditions, bound)
+        middle = 0.0 if exact is None else exact.acceleration_bound(budget)
     return BoxBound(
-        guaranteed=inequality.acceleration_bound(budget),
-        at_middle=inequality.acceleration_bound(budget, without=("damping", "stiffness")),
-        damping_cost=float(inequality.loops["damping"].max()),
-        stiffness_cost=float(inequality.loops["stiffness"].max()),
+        guaranteed=guaranteed,
+        at_middle=middle,
+        damping_cost=inequality.damping_cost,
+        stiffness_cost=inequality.stiffness_cost,
     )
 
 
@@ -91,12 +97,13 @@ def nonlinear_limit(
     """Return the bound proven for the nonlinear beam over all the intervals."""
 
     def evaluate(box: ParameterIntervals) -> BoxBound:
-        damping, stiffness = float(np.mean(box.damping)), float(np.mean(box.stiffness))
-        middle = ParameterIntervals(damping=(damping, damping), stiffness=(stiffness, stiffness))
-        widths = np.ptp((box.damping, box.stiffness), axis=1) / (damping, max(stiffness, 1e-9))
+        widths = np.ptp((box.damping, box.stiffness), axis=1) / (
+            box.middle.damping[0],
+            max(box.middle.stiffness[0], 1e-9),
+        )
         return BoxBound(
             guaranteed=nonlinear_limit_in_box(beam, sigma, conditions, box),
-            at_middle=nonlinear_limit_in_box(beam, sigma, conditions, middle),
+            at_middle=nonlinear_limit_in_box(beam, sigma, conditions, box.middle),
             damping_cost=float(widths[0]),
             stiffness_cost=float(widths[1]),
         )
@@ -105,4 +112,5 @@ def nonlinear_limit(
         return nonlinear_limit_in_box(beam, sigma, conditions, intervals)
     if beam.segment_count == 1:  # there the whole interval of dampings costs nothing
         intervals = replace(intervals, damping=(intervals.damping[0],) * 2)
+        return worst_case(intervals, evaluate, most_boxes=_MOST_PHASE_PLANES).bound
     return worst_case(intervals, evaluate, most_boxes=_MOST_NONLINEAR_BOXES).bound

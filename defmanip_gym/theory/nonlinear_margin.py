@@ -3,7 +3,8 @@
 One hinge: exactly, in the phase plane. More segments: the nonlinear terms of Eq. (6b) enter the
 linear object as torques whose size is bounded by the peaks of |z2|, |ż2| and |z̈2| so far,
 
-    R = H (1 − cos δ) |z̈2| + H |sin δ| ż2² + g S (|φ| − sin|φ|) + S (1 − cos φ) ā,
+    R = H (1 − cos δ) |z̈2| + H |sin δ| ż2² + g S (|φ| − sin|φ|) + S (1 − cos φ) ā
+        + u2² |Γ_ω| (|φ_k| − sin|φ_k| cos φ_j),
 
 δ_jk = |φ_j| + |φ_k|, H the inertial coupling and S the first moments. Peaks that satisfy
 p = β + g ā + Θ p + T R(p) cannot be exceeded (docs/derivations.md, section 5).
@@ -99,6 +100,7 @@ class _PeakIteration:
             + rows.of(conditions.vertical_acceleration_m_s2 * nominal.vertical_stiffness)
             + rows.of(conditions.yaw_rate_rad_s**2 * nominal.centrifugal_stiffness)
         )
+        self.turning = conditions.yaw_rate_rad_s**2 * np.abs(nominal.centrifugal_stiffness)
         self.loop = np.hstack((on_angles, on_rates, np.zeros_like(on_rates)))
 
     def stay(self, acceleration: float, sigma: float) -> bool:
@@ -131,4 +133,6 @@ class _PeakIteration:
         centrifugal = self.coupling * np.sin(np.minimum(between, np.pi / 2)) @ rate**2
         softening = GRAVITY_M_S2 * self.moments * (angle - np.sin(angle))
         misaligned = self.moments * (1 - np.cos(angle)) * acceleration
-        return inertial + centrifugal + softening + misaligned
+        turned = angle - np.sin(angle) * np.maximum(np.cos(angle), 0.0)[:, None]
+        turning = (self.turning * turned).sum(axis=1)
+        return inertial + centrifugal + softening + misaligned + turning

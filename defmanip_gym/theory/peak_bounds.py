@@ -15,7 +15,7 @@ from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.impulse_response import peak_gains
 from defmanip_gym.theory.zero_dynamics import LinearizedObject, lyapunov_matrix
 
-_DECAY_SHARES = np.geomspace(1e-3, 0.999, 120)
+_DECAY_SHARES = np.linspace(0.02, 0.98, 49)
 
 
 def tanner_bound(linear: LinearizedObject) -> Array:

@@ -19,6 +19,7 @@ from defmanip_gym.theory.conditions import CertificateConditions, ParameterInter
 
 _LARGEST_ACCELERATION_M_S2 = 100.0
 _ROUNDED_DOWN = 1 - 2e-5  # more than the errors of integration and root finding
+_RESOLUTION = 1e-9
 
 
 def one_hinge_stays(
@@ -58,10 +59,10 @@ def one_hinge_limit(
         lambda acceleration: 0.5 - stays(acceleration),
         0.0,
         _LARGEST_ACCELERATION_M_S2,
-        xtol=1e-7,
+        xtol=_RESOLUTION,
         rtol=1e-6,
     )
-    return float(limit * _ROUNDED_DOWN)
+    return max(float(limit * _ROUNDED_DOWN - 2 * _RESOLUTION), 0.0)
 
 
 class _Adversary:

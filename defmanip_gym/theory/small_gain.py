@@ -13,8 +13,9 @@ only what remains enters Θ (docs/derivations.md, section 5).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.linalg import eigh
@@ -42,36 +43,33 @@ class PeakInequality:
         gain: g, (3N,), per m/s² of horizontal acceleration.
         loops: the parts of Θ, (3N, 2N) each, by what they come from.
         input_loop: Θ_a, (3N, 2N), stiffness that the horizontal acceleration itself brings.
+        damping_cost: what not knowing the damping adds, roughly, as a loop gain.
+        stiffness_cost: the same for the stiffness.
     """
 
     free: Array
     gain: Array
     loops: Mapping[str, Array]
     input_loop: Array
+    damping_cost: float
+    stiffness_cost: float
 
-    def acceleration_bound(self, budget: Array, without: Collection[str] = ()) -> float:
+    def acceleration_bound(self, budget: Array) -> float:
         """Return the largest ā that keeps the coordinates within ``budget``; 0 if there is none.
 
         Args:
             budget: (N,), largest |z2 − z2*|.
-            without: parts of Θ to leave out.
         """
-        parts = [part for name, part in self.loops.items() if name not in without]
-        loop = sum(parts, np.zeros_like(self.input_loop))
-
-        def bound(loop: Array) -> float:
-            return self._bound_with(loop, budget)
-
-        limit = bound(loop)
+        loop = sum(self.loops.values(), np.zeros_like(self.input_loop))
+        limit = self._bound_with(loop, budget)
         if not self.input_loop.any() or limit == 0:
             return limit
         # ā is within the bound that its own loop leaves; both sides are monotone
         safe = 0.0
         for _ in range(_BISECTIONS):
             trial = (safe + limit) / 2
-            safe, limit = (
-                (trial, limit) if bound(loop + trial * self.input_loop) >= trial else (safe, trial)
-            )
+            holds = self._bound_with(loop + trial * self.input_loop, budget) >= trial
+            safe, limit = (trial, limit) if holds else (safe, trial)
         return safe
 
     def _bound_with(self, loop: Array, budget: Array) -> float:
@@ -82,7 +80,10 @@ class PeakInequality:
         sources = np.stack((self.free, self.gain), axis=1)
         peaks = np.linalg.solve(np.eye(modal) - closing, sources[:modal])
         free, gain = (sources[modal:] + outward @ peaks).T
-        return max(float(((budget - free) / gain).min()), 0.0)
+        if (free > budget).any():
+            return 0.0
+        moved = gain > 0
+        return float(((budget - free)[moved] / gain[moved]).min(initial=np.inf))
 
 
 def peak_inequality(
@@ -108,29 +109,42 @@ def peak_inequality(
     into_modes = np.linalg.inv(modes)
     nothing = np.zeros((count, count))
     C = np.block([[into_modes, nothing], [nothing, into_modes], [np.eye(count), nothing]])
-    per_modal_force = _force_gains(middle, linear.m_o22 @ modes, C)
+
+    @cache
+    def per_modal_force() -> Array:
+        return _force_gains(middle, linear.m_o22 @ modes, C)
 
     def loop(torques: Array, *, on_rates: bool = False) -> Array:
         """Return what torques (N, N) per unit of the coordinates, or of their rates, close."""
-        sizes = per_modal_force @ np.abs(modes.T @ torques @ modes)
+        if not torques.any():
+            return np.zeros((3 * count, 2 * count))
+        sizes = per_modal_force() @ np.abs(modes.T @ torques @ modes)
         idle = np.zeros_like(sizes)
         return np.hstack((idle, sizes) if on_rates else (sizes / slowest, idle))
 
     lifting = conditions.vertical_acceleration_m_s2
     free = peak_free_response(middle.A_u, _starts(conditions, count, slowest), C)
-    free = free + _force_gains(middle, -lifting * linear.m_o12[2][:, None], C)[:, 0] / slowest
+    if lifting > 0:
+        push = -lifting * linear.m_o12[2][:, None]
+        free = free + _force_gains(middle, push, C)[:, 0] / slowest
     gain = peak_gains(middle.A_u, horizontal_inputs(middle), C).sum(axis=1)
     gain[2 * count :] = bound(middle)[:count]
+    damping_loop = loop(scaling.damping_margin * linear.d_o22, on_rates=True)
+    residual_loop = loop(scaling.residual_stiffness)
     return PeakInequality(
         free=free,
         gain=gain / slowest,
         loops={
-            "damping": loop(scaling.damping_margin * linear.d_o22, on_rates=True),
-            "stiffness": loop(scaling.residual_stiffness),
+            "damping": damping_loop,
+            "stiffness": residual_loop,
             "lifting": loop(lifting * linear.vertical_stiffness),
             "turning": loop(conditions.yaw_rate_rad_s**2 * linear.centrifugal_stiffness),
         },
         input_loop=sum(map(loop, linear.horizontal_stiffness), np.zeros_like(loop(nothing))),
+        damping_cost=scaling.damping_share * float(damping_loop.max()),
+        stiffness_cost=(1 - scaling.damping_share) * float(damping_loop.max())
+        + float(residual_loop.max())
+        + (1 / slowest - 1),
     )
 
 
@@ -160,6 +174,7 @@ class _TimeScaling:
         stiffness: factor at the middle of the box.
         residual_stiffness: largest R, (N, N).
         slowest: smallest c.
+        damping_share: share of ``damping_margin`` that the damping's own interval has.
     """
 
     damping: float
@@ -167,6 +182,7 @@ class _TimeScaling:
     stiffness: float
     residual_stiffness: Array
     slowest: float
+    damping_share: float
 
     @classmethod
     def of(cls, linear: LinearizedObject, box: ParameterIntervals) -> _TimeScaling:
@@ -177,7 +193,9 @@ class _TimeScaling:
         share = float(modes[:, 0] @ linear.k_o22 @ modes[:, 0] / values[0])
         slowest, fastest = 1 - margin * share, 1 + margin * share
         low, high = box.damping[0] / np.sqrt(fastest), box.damping[1] / np.sqrt(slowest)
+        own = float(np.ptp(box.damping))
         return cls(
+            damping_share=min(own / float(high - low), 1.0) if own > 0 else 0.0,
             damping=float(low + high) / 2,
             damping_margin=float(high - low) / 2,
             stiffness=stiffness,

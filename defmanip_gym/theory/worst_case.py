@@ -40,8 +40,8 @@ class WorstCase:
     """Smallest bound over the intervals.
 
     Attributes:
-        bound: holds for every object in the intervals; at most 5 % below the true minimum, or
-            farther below where the boxes did not suffice.
+        bound: holds for every object in the intervals; within 5 % of the bound at the middle of
+            some box, or farther below where the boxes did not suffice.
         damping: factor on the damping where the bound is smallest.
         stiffness: factor on the stiffness there.
     """

@@ -34,8 +34,8 @@ class LinearizedObject:
         vertical_stiffness: Γ_z, (N, N), stiffness per m/s² of upward acceleration.
         centrifugal_stiffness: Γ_ω, (N, N), stiffness lost per (rad/s)² of yaw rate.
         equilibrium: z2* of Eq. (12), (N,).
-        is_excited_by_yaw: whether turning moves the object even at its equilibrium, or couples to
-            its rates; then no certificate allows a yaw rate.
+        is_excited_by_yaw: whether turning moves the object even at its equilibrium, or a yaw
+            acceleration, which nothing bounds, does; then no certificate allows a yaw rate.
         coordinates: names of the internal coordinates.
     """
 

@@ -6,11 +6,11 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from defmanip_gym.errors import ObjectFileError
+from defmanip_gym.errors import CertificateError, ObjectFileError
 from defmanip_gym.objects.mjcf_object import mjcf_object, object_from_mjcf
 from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.object_rig import ObjectRig
-from defmanip_gym.theory.certificates import certify
+from defmanip_gym.theory.certificates import CertificateConditions, certify
 from defmanip_gym.theory.zero_dynamics import is_hurwitz, linearize
 
 HOSE = files("defmanip_gym.objects") / "examples" / "hose.xml"
@@ -266,3 +266,23 @@ def test_the_push_of_an_acceleration_changes_with_the_deformation_of_a_bent_obje
     np.testing.assert_allclose(bent.linear.m_o12[:, 0], [-z, 0, x], atol=1e-9)
     np.testing.assert_allclose(bent.linear.horizontal_stiffness[:, 0, 0], [-x, 0], atol=1e-8)
     np.testing.assert_allclose(bent.linear.vertical_stiffness, -z, atol=1e-8)
+
+
+def test_yaw_acceleration_that_only_acts_beside_the_equilibrium_counts_too(write):
+    # two balls off the plane of the swing: its product of inertia grows with the swing
+    plate = """<body name="grip"><site name="grasp"/><geom size="0.05" mass="0.5"/><body>
+        <joint name="swing" axis="0 -1 0" damping="0.02"/>
+        <geom type="sphere" size="0.02" mass="0.5" pos=".15 .6 -.15"/>
+        <geom type="sphere" size="0.02" mass="0.5" pos="-.15 -.6 -.15"/></body></body>"""
+    linear = object_from_mjcf(write(plate), grasp_site="grasp")
+    assert linear.is_excited_by_yaw
+    with pytest.raises(CertificateError, match="yaw_rate"):
+        certify(linear, conditions=CertificateConditions(yaw_rate_rad_s=0.3))
+
+
+def test_an_object_that_horizontal_acceleration_leaves_alone_is_refused(write):
+    spring = """<body name="grip"><site name="grasp"/><geom size="0.05" mass="0.5"/><body>
+        <joint name="bounce" type="slide" axis="0 0 1" stiffness="500" damping="5"/>
+        <geom size="0.05" mass="0.5"/></body></body>"""
+    with pytest.raises(CertificateError, match="horizontal"):
+        certify(object_from_mjcf(write(spring), grasp_site="grasp"))

@@ -199,3 +199,20 @@ def test_tanner_covers_the_lifting_that_its_nu_counts(damping, mass, segments, s
         vertical_acceleration_m_s2=tanner.conditions.vertical_acceleration_m_s2
     )
     assert certify(beam, conditions=lifted).nu_max >= tanner.acceleration_bound
+
+
+@pytest.mark.parametrize("name", ["conditions", "intervals"])
+@pytest.mark.parametrize("value", ["narrow", {}, 0, (0.5, 2.0)])
+def test_conditions_and_intervals_of_another_kind_are_refused(name, value):
+    with pytest.raises(ParameterError, match=name):
+        certify(PLANT, **{name: value})
+
+
+def test_conditions_that_nothing_is_carried_under_are_refused():
+    with pytest.raises(ParameterError, match="yaw_rate"):
+        CertificateConditions(yaw_rate_rad_s=1e160)
+
+
+def test_objects_damped_next_to_nothing_are_refused_at_once():
+    with pytest.raises(CertificateError, match="damping ratios"):
+        certify(BeamParams(damping=1e-6))

@@ -99,6 +99,19 @@ def test_an_interval_that_reaches_zero_damping_is_refused():
         certify(BeamParams(), intervals=ParameterIntervals(damping=(0.0, 1.0)))
 
 
+def test_lists_are_taken_as_intervals():
+    listed = ParameterIntervals(damping=[0.8, 1.2], stiffness=[1.0, 1.0])
+    assert listed == ParameterIntervals(damping=(0.8, 1.2))
+    assert certify(BeamParams(), intervals=listed).proof == "nonlinear"
+
+
+def test_a_wide_interval_of_a_spring_is_not_refused_for_its_nonlinear_limit():
+    wide = ParameterIntervals(stiffness=(0.1, 2.0))
+    certificate = certify(BeamParams(damping=3.0, root_stiffness=20.0), intervals=wide)
+    weakest = certify(BeamParams(damping=3.0, root_stiffness=2.0)).nu_max
+    assert 0.5 * weakest < certificate.nu_max <= weakest
+
+
 @pytest.mark.parametrize("interval", [(2.0, 1.0), (-1.0, 1.0), (1.0,), (1.0, math.inf), "12"])
 def test_intervals_that_are_none_are_refused(interval):
     with pytest.raises(ParameterError, match="damping"):
