@@ -26,14 +26,15 @@ def ladder_table(ladder: Ladder) -> Table:
     """Return the table for the terminal."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("method", no_wrap=True)
-    for heading in ("ν_max\nm/s²", "times\ntanner", "acceleration\nm/s²", "tightness"):
+    for heading in ("ν_max\nm/s²", "times\ntanner", "bound\nm/s²", "tightness"):
         table.add_column(heading, justify="right")
     table.add_column("proven for\nthe object")
     reference = ladder.certificates.get("tanner")
     for method in CERTIFICATE_METHODS:
         certificate = ladder.certificates.get(method)
-        if certificate is None:
+        if certificate is None and method in ladder.refusals:
             table.add_row(method, *[_NONE] * 4, "no room left")
+        if certificate is None:
             continue
         table.add_row(
             method,
