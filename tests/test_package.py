@@ -1,6 +1,7 @@
 """The package's structure: what importing costs and which way imports point."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -99,3 +100,9 @@ def test_running_an_environment_and_the_papers_controller_needs_no_torch():
         "sys.exit('torch' in sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_reading_order_of_the_theory_names_every_module():
+    text = (PACKAGE / "theory" / "__init__.py").read_text()
+    modules = {path.stem for path in (PACKAGE / "theory").glob("*.py")} - {"__init__", "frames"}
+    assert modules == set(re.findall(r"``(\w+)``", text))
