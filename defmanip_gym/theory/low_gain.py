@@ -16,8 +16,8 @@ import math
 from dataclasses import dataclass
 from functools import cache, cached_property
 
+import control
 import numpy as np
-from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
 from defmanip_gym.errors import CertificateError, ParameterError
@@ -193,5 +193,5 @@ def stabilize(linear: LinearizedObject, sigma_rad: float, mu: float) -> Internal
 
 def _riccati_feedback(linear: LinearizedObject, epsilon: float) -> Array:
     b = linear.forward_input[:, None]
-    P = solve_continuous_are(linear.A_u, b, epsilon * np.eye(len(b)), np.eye(1))
-    return np.asarray(-(b.T @ P)[0], dtype=np.float64)
+    gain, _, _ = control.lqr(linear.A_u, b, epsilon * np.eye(len(b)), np.eye(1), method="scipy")
+    return np.asarray(-gain[0], dtype=np.float64)
