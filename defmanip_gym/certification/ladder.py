@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,7 +114,7 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         return ladder
     tell("attack on the plant")
     attack = attack_certificate(ladder.tightest, target=target, longest_s=config.longest_attack_s)
-    return Ladder(**{**vars(ladder), "attack": attack})
+    return replace(ladder, attack=attack)
 
 
 def _resonant_limit(linear: LinearizedObject, sigma: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from pathlib import Path
 
@@ -13,11 +12,10 @@ from matplotlib.figure import Figure
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.certification.ladder import Ladder
 from defmanip_gym.certification.table import PROOFS
-from defmanip_gym.files import write_atomically
+from defmanip_gym.display import save_figure
 from defmanip_gym.plant.object_rig import ObjectRig
 from defmanip_gym.theory.chain import Array
 
-_DPI = 140
 _COLOURS = {"nonlinear": "#1b7f4d", "linear": "#2f6db3", "none": "#b9b9b9"}
 _INK, _RED = "#333333", "#c0392b"
 
@@ -30,9 +28,7 @@ def save_plot(path: Path, ladder: Ladder) -> None:
     _draw_bounds(axes[0], ladder)
     if panels == 2 and ladder.attack is not None:
         _draw_attack(axes[1], ladder, ladder.attack)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI)
-    write_atomically(path, buffer.getvalue())
+    save_figure(path, figure)
 
 
 def _has_trajectory(attack: AttackResult) -> bool:

@@ -10,16 +10,10 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeRemainingColumn,
-)
 
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.baselines.learned.agents import load_agent, shipped_agents
+from defmanip_gym.display import progress_bar
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestants import (
@@ -163,7 +157,7 @@ def _run_missing(
             trace.save(config.output / TRACE_FOLDER)
         store.add(record)
 
-    with _progress(console) as progress:
+    with progress_bar(console) as progress:
         task = progress.add_task("", total=len(jobs) * steps or 1)
         for index, (contestant, controller, missing) in enumerate(jobs):
             progress.update(task, description=contestant.name, completed=index * steps)
@@ -179,13 +173,3 @@ def _run_missing(
                 on_step=lambda: progress.advance(task),
             )
         progress.update(task, description="all contestants", completed=len(jobs) * steps or 1)
-
-
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description:<16}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=console,
-    )

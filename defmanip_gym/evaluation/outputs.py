@@ -10,9 +10,10 @@ from pathlib import Path
 
 from rich.console import Console
 
+from defmanip_gym.display import save_figure
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestants import Contestant
-from defmanip_gym.evaluation.plots import PLOTS, save_figure
+from defmanip_gym.evaluation.plots import PLOTS
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report import Figure, Setting, embedded, write_report
 from defmanip_gym.evaluation.scenarios import FIRST_EVALUATION_SEED

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -16,11 +14,9 @@ from matplotlib.lines import Line2D
 
 from defmanip_gym.evaluation.scenarios import PAPER_SCENARIO
 from defmanip_gym.evaluation.traces import Trace
-from defmanip_gym.files import write_atomically
 
 Colours = Mapping[str, str]
 
-_DPI = 140
 _INK, _FAINT, _BAND, _GOAL = "#333333", "#d9d9d9", "#e8f3ec", "#f2c230"
 _SHORTEST_AXIS_S = 2.0
 _COMPONENTS: tuple[tuple[int, str, float, Literal["-", "--", ":"]], ...] = (
@@ -45,13 +41,6 @@ class Plot:
     title: str
     caption: str
     draw: Callable[[Sequence[Trace], Colours], Figure]
-
-
-def save_figure(path: Path, figure: Figure) -> None:
-    """Write a figure as PNG."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI)
-    write_atomically(path, buffer.getvalue())
 
 
 def plot_swing(traces: Sequence[Trace], colours: Colours) -> Figure:

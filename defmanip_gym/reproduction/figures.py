@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from defmanip_gym.files import write_atomically
 from defmanip_gym.reproduction.course import FORCE_ERROR, POSITION, Course
 from defmanip_gym.reproduction.parts import Numbers
 from defmanip_gym.reproduction.setting import SIGMA_RAD
@@ -20,7 +17,7 @@ from defmanip_gym.theory.chain import Array
 
 Arrays = Mapping[str, Array]
 
-_DPI = 130
+DPI = 130
 _WIDTH = 8.0
 _INK, _FAINT = "#333333", "#d9d9d9"
 _COLOURS = ("#1f5f8b", "#c8553d", "#5b8c5a")
@@ -41,14 +38,6 @@ class Illustration:
     name: str
     part: str
     draw: Callable[[Numbers, Arrays], Figure]
-
-
-def save(path: Path, figure: Figure) -> None:
-    """Write a figure as PNG."""
-    buffer = io.BytesIO()
-    # no date or version inside: the same figure is the same file
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    write_atomically(path, buffer.getvalue())
 
 
 def figure_2(numbers: Numbers, arrays: Arrays) -> Figure:

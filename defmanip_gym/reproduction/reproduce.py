@@ -9,11 +9,12 @@ from functools import partial
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress
 
+from defmanip_gym.display import progress_bar, save_figure
 from defmanip_gym.errors import RecordError
 from defmanip_gym.reproduction.config import ReproductionConfig
-from defmanip_gym.reproduction.figures import FIGURES, save
+from defmanip_gym.reproduction.figures import DPI, FIGURES
 from defmanip_gym.reproduction.page import write_page
 from defmanip_gym.reproduction.parts import Numbers, Part, fingerprint, finished_or_made
 from defmanip_gym.reproduction.setting import paper_setting
@@ -61,7 +62,7 @@ def _parts(config: ReproductionConfig, console: Console) -> dict[str, Part]:
         for path in folder.glob("*.npz"):
             path.unlink()
     parts = {}
-    with _progress(console) as progress:
+    with progress_bar(console) as progress:
         for name, study in STUDIES.items():
             task = progress.add_task(name.replace("_", " "), total=1)
             settings = [name, settings_of_studies(), config.max_duration_s, __version__]
@@ -104,7 +105,8 @@ def _timed(make: Callable[[], Part]) -> Callable[[], Part]:
 def _write(folder: Path, parts: dict[str, Part]) -> Path:
     for figure in FIGURES:
         part = parts[figure.part]
-        save(folder / f"{figure.name}.png", figure.draw(part.numbers, part.arrays))
+        drawn = figure.draw(part.numbers, part.arrays)
+        save_figure(folder / f"{figure.name}.png", drawn, dpi=DPI)
     numbers: Numbers = {name: part.numbers for name, part in parts.items()}
     numbers["cpu_s"] = {name: round(part.cpu_s, 1) for name, part in parts.items()}
     return write_page(folder, numbers)
@@ -121,13 +123,3 @@ def _tell(console: Console, numbers: Numbers, page: Path) -> None:
         highlight=False,
     )
     console.print(f"Page: {page.resolve()}", soft_wrap=True, highlight=False)
-
-
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description:<16}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=console,
-    )

@@ -13,6 +13,7 @@ import numpy as np
 
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.impulse_response import peak_gains
+from defmanip_gym.theory.iss_gain import iss_gain
 from defmanip_gym.theory.zero_dynamics import LinearizedObject, lyapunov_matrix
 
 _DECAY_SHARES = np.linspace(0.02, 0.98, 49)
@@ -20,12 +21,14 @@ _DECAY_SHARES = np.linspace(0.02, 0.98, 49)
 
 def tanner_bound(linear: LinearizedObject) -> Array:
     """Return 8 N² λ_M λ_M(B_u) √(λ_M/λ_m), what Eq. (21) implies for ‖ν‖∞; (2N,)."""
-    return _uniform(linear, _lyapunov_gain(linear, inverted=False))
+    return _uniform(linear, _gain_of_equation_21(linear, lyapunov_matrix(linear.A_u)))
 
 
 def tanner_printed_bound(linear: LinearizedObject) -> Array:
     """Return the same with the radical as printed in Eq. (18), √(λ_m/λ_M): no bound; (2N,)."""
-    return _uniform(linear, _lyapunov_gain(linear, inverted=True))
+    P = lyapunov_matrix(linear.A_u)
+    smallest, largest = np.linalg.eigvalsh(P)[[0, -1]]
+    return _uniform(linear, _gain_of_equation_21(linear, P) * smallest / largest)
 
 
 def lyapunov_bound(linear: LinearizedObject) -> Array:
@@ -82,11 +85,10 @@ def horizontal_inputs(linear: LinearizedObject) -> Array:
     return columns[:, np.abs(columns).max(axis=0) > 0]
 
 
-def _lyapunov_gain(linear: LinearizedObject, *, inverted: bool) -> float:
-    smallest, largest = np.linalg.eigvalsh(lyapunov_matrix(linear.A_u))[[0, -1]]
-    radical = math.sqrt(smallest / largest if inverted else largest / smallest)
-    input_gain = np.linalg.norm(linear.B_u, 2)  # λ_M(B_u) = √λ_max(B_u B_uᵀ)
-    return float(8 * linear.count**2 * largest * input_gain * radical)
+def _gain_of_equation_21(linear: LinearizedObject, P: Array) -> float:
+    """Return γ(sup‖B_u ν‖) for ‖ν‖∞ = 1 with ‖B_u ν‖ ≤ √(2N) λ_M(B_u): 8 N² λ_M(P) λ_M(B_u) √…."""
+    input_gain = float(np.linalg.norm(linear.B_u, 2))  # λ_M(B_u) = √λ_max(B_u B_uᵀ)
+    return iss_gain(P, linear.count, math.sqrt(2 * linear.count) * input_gain)
 
 
 def _uniform(linear: LinearizedObject, gain: float) -> Array:
