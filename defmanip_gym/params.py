@@ -7,7 +7,9 @@ N·m/rad). Every constructor raises :class:`~defmanip_gym.errors.ParameterError`
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import TYPE_CHECKING
 
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import (
@@ -16,8 +18,12 @@ from defmanip_gym.validation import (
     require_instance,
     require_non_negative,
     require_positive,
+    require_range,
     require_whole,
 )
+
+if TYPE_CHECKING:  # parameters are plain numbers; only sampling mentions NumPy
+    import numpy as np
 
 GRAVITY_M_S2 = 9.81
 
@@ -147,6 +153,71 @@ class BeamParams:
     def segment_length_m(self) -> float:
         """Length of one segment."""
         return self.length_m / self.segment_count
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeamRanges:
+    """Ranges (low, high), ends included, from which every episode draws its beam uniformly.
+
+    Each replaces the beam's own value; None keeps it.
+    """
+
+    damping: tuple[float, float] | None = None
+    mass_kg: tuple[float, float] | None = None
+    length_m: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for name, unit in (("damping", "N m s/rad"), ("mass_kg", "kg"), ("length_m", "m")):
+            ends = getattr(self, name)
+            if ends is not None:
+                require_range(name, ends, may_be_zero=name == "damping", unit=unit)
+                object.__setattr__(self, name, (float(ends[0]), float(ends[1])))
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether every beam keeps all its values."""
+        return self.damping is None and self.mass_kg is None and self.length_m is None
+
+    def require_fit(self, beam: BeamParams) -> None:
+        """Raise ParameterError if a beam with a length from the range would be too stubby."""
+        if self.length_m is None:
+            return
+        try:
+            replace(beam, length_m=self.length_m[0])
+        except ParameterError as error:
+            raise ParameterError(
+                "length_m",
+                self.length_m,
+                f"a range whose low end allows radius_m={beam.radius_m:g} in each of "
+                f"{beam.segment_count} segments: {error.allowed}",
+                "Raise the low end, or take a thinner beam or fewer segments.",
+            ) from error
+
+    def extremes(self, beam: BeamParams) -> tuple[BeamParams, ...]:
+        """Return ``beam`` with all combinations of the ranges' ends."""
+        ends = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        varied = {name: pair for name, pair in ends.items() if pair is not None}
+        return tuple(
+            replace(beam, **dict(zip(varied, values, strict=True)))
+            for values in product(*varied.values())
+        )
+
+    def sample(self, beam: BeamParams, generator: np.random.Generator) -> BeamParams:
+        """Return ``beam`` with new values for those that have a range.
+
+        The order of the draws is fixed: damping, mass, length, each only if it has a range.
+        """
+        self.require_fit(beam)
+
+        def draw(ends: tuple[float, float] | None, own: float) -> float:
+            return own if ends is None else float(generator.uniform(*ends))
+
+        return replace(
+            beam,
+            damping=draw(self.damping, beam.damping),
+            mass_kg=draw(self.mass_kg, beam.mass_kg),
+            length_m=draw(self.length_m, beam.length_m),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,6 +46,20 @@ def require_finite_sequence(name: str, values: Sequence[float], length: int) -> 
         )
 
 
+def require_range(
+    name: str, ends: Sequence[float], *, may_be_zero: bool = False, unit: str = ""
+) -> None:
+    """Raise ParameterError unless ``ends`` is (low, high), in order, finite and not negative."""
+    is_pair = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) == 2
+    if is_pair and all(map(_is_finite_number, ends)):
+        low, high = ends
+        if (0 < low or (may_be_zero and low == 0)) and low <= high < _LARGEST:
+            return
+    first = "0 <= low" if may_be_zero else "0 < low"
+    allowed = f"(low, high) with {first} <= high < {_LARGEST:g} {unit}".rstrip()
+    raise ParameterError(name, ends, allowed, "Give two finite numbers, the smaller one first.")
+
+
 def require_instance(name: str, value: object, kind: type) -> None:
     """Raise ParameterError unless ``value`` is an instance of ``kind``."""
     if not isinstance(value, kind):

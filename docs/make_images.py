@@ -29,7 +29,7 @@ def strip() -> Image.Image:
     for step in range(900):
         action, state = controller.predict(observation, state, np.array([step == 0]))
         result = engine.step(action)
-        observation = result.observation
+        observation = result.observations
         if step == 250:
             frames.insert(0, renderer.render("rgb_array"))
         if result.terminated[0]:

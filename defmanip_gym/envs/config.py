@@ -11,6 +11,7 @@ import numpy as np
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import (
     BeamParams,
+    BeamRanges,
     DisturbanceParams,
     RobotParams,
     TaskParams,
@@ -27,9 +28,10 @@ ConstraintMode = Literal["terminate", "penalty", "cost"]
 class TransportConfig:
     """Arguments of the environment; see its documentation.
 
-    ``robot`` and ``beam`` are true, ``nominal_robot`` and ``nominal_beam`` what the built-in
-    feedback linearization believes. By default it believes the truth, except that it counts on no
-    damping at the root: overestimated damping destabilizes the swing.
+    ``robot`` and ``beam`` are true, the beam but for what ``beam_ranges`` vary; ``nominal_robot``
+    and ``nominal_beam`` are what the built-in feedback linearization believes. By default it
+    believes the truth, except that it counts on no damping at the root: overestimated damping
+    destabilizes the swing.
     """
 
     control_mode: ControlMode = "task"
@@ -37,6 +39,7 @@ class TransportConfig:
     sigma_rad: float = math.pi / 6
     robot: RobotParams = field(default_factory=RobotParams)
     beam: BeamParams = field(default_factory=BeamParams)
+    beam_ranges: BeamRanges = field(default_factory=BeamRanges)
     nominal_robot: RobotParams | None = None
     nominal_beam: BeamParams | None = None
     task: TaskParams = field(default_factory=TaskParams)
@@ -46,6 +49,7 @@ class TransportConfig:
         for name, kind, optional in (
             ("robot", RobotParams, False),
             ("beam", BeamParams, False),
+            ("beam_ranges", BeamRanges, False),
             ("nominal_robot", RobotParams, True),
             ("nominal_beam", BeamParams, True),
             ("task", TaskParams, False),
@@ -63,6 +67,7 @@ class TransportConfig:
                 f"|φ| <= σ = {self.sigma_rad:.4g} rad at every sampled start",
                 "Narrow its spread or raise sigma_rad.",
             )
+        self.beam_ranges.require_fit(self.beam)
         nominal = self.nominal_beam
         if nominal is not None and nominal.segment_count != self.beam.segment_count:
             raise ParameterError(

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
-from defmanip_gym.params import BeamParams, DisturbanceParams, RobotParams, TaskParams
+from defmanip_gym.params import (
+    BeamParams,
+    BeamRanges,
+    DisturbanceParams,
+    RobotParams,
+    TaskParams,
+)
 from defmanip_gym.validation import require_choice
 
 Array = NDArray[np.float64]
@@ -88,12 +94,14 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
 
     Every step's `info` also holds `is_success` and, in every mode, `cost` (1.0 while ‖z2‖∞ > σ,
     else 0.0), `constraint_margin` (σ − ‖z2‖∞, rad), `cost_speed` (grasp speed beyond the limit,
-    m/s), `left_workspace`, `simulation_failed` and `distance_to_goal` (m).
+    m/s), `left_workspace`, `simulation_failed`, `distance_to_goal` (m), and what the true beam of
+    this episode is: `beam_damping` (N·m·s/rad), `beam_mass_kg` and `beam_length_m`.
 
     ## Starting State
     At rest, uniformly within ±(1.5 m, 1.5 m, 0.5 rad, 0.1 rad, 0.1 rad, 0.05 rad) of the paper's
     (x, y, θ, q1, q2, φ) = (-8.5, 5.5, 0, π/3, -π/2, 0). `reset(options={"start": "paper"})` starts
-    right there, and `{"start": (x, y, θ, q1, q2, φ)}` anywhere in the workspace.
+    right there, and `{"start": (x, y, θ, q1, q2, φ)}` anywhere in the workspace. With
+    `beam_ranges`, as in `BeamRanges(damping=(0.05, 1.0))`, each episode draws its own beam.
 
     ## Episode End
     Termination: success (grasp within 5 cm of the goal, slower than 5 cm/s, |φ| < 0.05 rad, heading
@@ -110,6 +118,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     | sigma_rad       | π/6              | σ, admissible swing, between 0 and π/3                 |
     | robot           | `RobotParams()`  | true robot                                             |
     | beam            | `BeamParams()`   | true beam                                              |
+    | beam_ranges     | none (`BeamRanges()`) | damping, mass, length to draw each episode from   |
     | nominal_robot   | `None`           | robot of the feedback linearization; the true one      |
     | nominal_beam    | `None`           | its beam; the true one with no damping at the root     |
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
@@ -130,6 +139,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
         sigma_rad: float = math.pi / 6,
         robot: RobotParams = RobotParams(),
         beam: BeamParams = BeamParams(),
+        beam_ranges: BeamRanges = BeamRanges(),
         nominal_robot: RobotParams | None = None,
         nominal_beam: BeamParams | None = None,
         task: TaskParams = TaskParams(),
@@ -144,6 +154,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
             sigma_rad=sigma_rad,
             robot=robot,
             beam=beam,
+            beam_ranges=beam_ranges,
             nominal_robot=nominal_robot,
             nominal_beam=nominal_beam,
             task=task,
@@ -158,6 +169,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
             sigma_rad=sigma_rad,
             robot=robot,
             beam=beam,
+            beam_ranges=beam_ranges,
             nominal_robot=nominal_robot,
             nominal_beam=nominal_beam,
             task=task,
@@ -173,10 +185,10 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     ) -> tuple[Array, dict[str, Any]]:
         """Start an episode; see "Starting State" for ``options``."""
         super().reset(seed=seed)
-        observation, info = self.engine.reset(seeds=[seed], options=options)
+        observation, _ = self.engine.reset(seeds=[seed], options=options)
         if self.render_mode == "human":
             self.render()
-        return observation[0], _single(info)
+        return observation[0], self.engine.single_info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Advance one control period (20 ms).
@@ -184,15 +196,15 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
         Raises:
             ActionError: wrong shape or values that are not finite.
         """
-        result = self.engine.step(np.expand_dims(np.asarray(action), 0))
+        scores = self.engine.step([action])
         if self.render_mode == "human":
             self.render()
         return (
-            result.observation[0],
-            float(result.reward[0]),
-            bool(result.terminated[0]),
+            scores.observations[0],
+            scores.rewards.item(),
+            scores.terminated.item(),
             False,
-            _single(result.info),
+            self.engine.single_info,
         )
 
     def render(self) -> Any:
@@ -223,7 +235,3 @@ def observation_space(engine: TransportEngine) -> spaces.Box:
 def action_space(engine: TransportEngine) -> spaces.Box:
     """Return the action space of one episode."""
     return spaces.Box(-1.0, 1.0, (engine.action_size,), np.float64)
-
-
-def _single(info: dict[str, Any]) -> dict[str, Any]:
-    return {key: value[0].item() for key, value in info.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import sys
 from typing import Any
@@ -39,7 +40,7 @@ class TransportRenderer:
         camera: str = names.TRACKING_CAMERA,
     ) -> None:
         self._engine, self._index = engine, index
-        self._model = engine.simulation.model
+        self._model = copy.copy(engine.simulation.model)
         self._data = mujoco.MjData(self._model)
         self._segments = [
             self._model.geom(names.segment_geom(k)).id
@@ -56,7 +57,7 @@ class TransportRenderer:
             RenderingError: the machine offers no OpenGL.
         """
         engine = self._engine
-        engine.simulation.materialize(self._index, self._data)
+        engine.simulation.materialize(self._index, self._model, self._data)
         swing = float(engine.largest_swing_rad[self._index])
         self._model.geom_rgba[self._segments] = swing_color(swing, engine.config.sigma_rad)
         if mode != "human":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.envs.workspace import in_workspace
+from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import StartParams
 
@@ -50,9 +50,10 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
     return np.broadcast_to(values, (count, 6)).copy()
 
 
-def sample_start(params: StartParams, generator: np.random.Generator) -> Array:
-    """Return one start, (6,), uniform within the spread."""
-    return np.array(params.center) + np.array(params.spread) * generator.uniform(-1.0, 1.0, 6)
+def sample_starts(params: StartParams, generators: Sequence[np.random.Generator]) -> Array:
+    """Return a start from each generator, (k, 6), uniform within the spread."""
+    drawn = np.array([generator.random(6) for generator in generators])
+    return np.array(params.center) + np.array(params.spread) * (2.0 * drawn - 1.0)
 
 
 def extreme_starts(params: StartParams) -> Array:
@@ -63,7 +64,8 @@ def extreme_starts(params: StartParams) -> Array:
 
 def check_starts(starts: Array, config: TransportConfig) -> None:
     """Raise StartError unless every start (k, 6) lies in the workspace and within σ."""
-    inside = in_workspace(starts[:, :3], starts[:, 3:5], config)
+    upper, fore = starts[:, 3], starts[:, 3] + starts[:, 4]
+    inside = in_workspace(starts[:, :3], upper, fore, workspace_of(config))
     inside &= np.abs(starts[:, 2]) < _LARGEST_HEADING_RAD
     within = np.abs(starts[:, 5]) <= config.sigma_rad
     for start, reachable, straight in zip(starts, inside, within, strict=True):

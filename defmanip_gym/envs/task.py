@@ -1,144 +1,185 @@
-"""Success, cost and reward of the transport task as pure functions of the state."""
+"""Success, cost and reward of the transport task as pure functions of one episode's state."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from defmanip_gym.params import RewardParams, TaskParams
-from defmanip_gym.theory.velocity_field import streamline_heading
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from defmanip_gym.compiled import compiled
+from defmanip_gym.envs.config import TransportConfig
 
 
-@dataclass(frozen=True, kw_only=True)
-class TaskState:
-    """What the task looks at, n episodes.
+class TaskState(NamedTuple):
+    """What the task looks at.
 
     Attributes:
-        distance_m: grasp to goal, (n,).
-        height_error_m: of the grasp, (n,).
-        speed_m_s: of the grasp, (n,).
-        heading_error_rad: θ − θ_goal wrapped to (−π, π], (n,).
+        distance_m: grasp to goal.
+        height_error_m: of the grasp.
+        speed_m_s: of the grasp.
+        heading_error_rad: θ − θ_goal wrapped to (−π, π].
         course_error_rad: |θ − heading of the dipole streamline through the grasp|, blended into
-            |θ − θ_goal| at the goal, (n,).
-        largest_swing_rad: ‖z2‖∞, (n,).
+            |θ − θ_goal| at the goal.
+        largest_swing_rad: ‖z2‖∞.
     """
 
-    distance_m: Array
-    height_error_m: Array
-    speed_m_s: Array
-    heading_error_rad: Array
-    course_error_rad: Array
-    largest_swing_rad: Array
+    distance_m: float
+    height_error_m: float
+    speed_m_s: float
+    heading_error_rad: float
+    course_error_rad: float
+    largest_swing_rad: float
 
 
-def tolerance_shares(state: TaskState, task: TaskParams) -> Array:
-    """Return each error over its tolerance, (4, n): distance, speed, swing, heading."""
-    return np.stack(
-        (
-            state.distance_m / task.position_tolerance_m,
-            state.speed_m_s / task.speed_tolerance_m_s,
-            state.largest_swing_rad / task.swing_tolerance_rad,
-            np.abs(state.heading_error_rad) / task.heading_tolerance_rad,
-        )
+class Outcome(NamedTuple):
+    """How a step ended."""
+
+    success: bool
+    left_workspace: bool
+    simulation_failed: bool
+
+
+class Potentials(NamedTuple):
+    """The shaping potentials, by the reward term that the difference of each makes."""
+
+    distance: float
+    course: float
+    closeness: float
+
+
+class RewardTerms(NamedTuple):
+    """What the reward is the sum of."""
+
+    reward_distance: float
+    reward_course: float
+    reward_closeness: float
+    reward_time: float
+    reward_effort: float
+    reward_success: float
+    reward_failure: float
+    reward_deformation: float
+
+
+class RewardWeights(NamedTuple):
+    """``RewardParams`` for compiled code."""
+
+    distance_weight_per_m: float
+    course_weight_per_rad: float
+    closeness_weight: float
+    time_cost_per_step: float
+    effort_weight: float
+    success_bonus: float
+    failure_penalty: float
+    deformation_penalty: float
+
+
+class Task(NamedTuple):
+    """The task's constants for compiled code; see ``TaskParams`` and ``TransportConfig``."""
+
+    position_tolerance_m: float
+    speed_tolerance_m_s: float
+    swing_tolerance_rad: float
+    heading_tolerance_rad: float
+    max_speed_m_s: float
+    sigma_rad: float
+    violation_ends: bool
+    excess_is_penalized: bool
+    weights: RewardWeights
+
+
+def task_of(config: TransportConfig) -> Task:
+    """Return the constants of an environment's task."""
+    task = config.task
+    return Task(
+        position_tolerance_m=float(task.position_tolerance_m),
+        speed_tolerance_m_s=float(task.speed_tolerance_m_s),
+        swing_tolerance_rad=float(task.swing_tolerance_rad),
+        heading_tolerance_rad=float(task.heading_tolerance_rad),
+        max_speed_m_s=float(task.max_speed_m_s),
+        sigma_rad=float(config.sigma_rad),
+        violation_ends=config.constraint_mode == "terminate",
+        excess_is_penalized=config.constraint_mode == "penalty",
+        weights=RewardWeights(**{k: float(v) for k, v in asdict(task.reward).items()}),
     )
 
 
-def is_success(state: TaskState, task: TaskParams) -> BoolArray:
-    """Whether all four errors are within their tolerances, (n,)."""
-    return np.asarray((tolerance_shares(state, task) < 1.0).all(axis=0))
+@compiled
+def tolerance_shares(state: TaskState, task: Task) -> tuple[float, float, float, float]:
+    """Return each error over its tolerance: distance, speed, swing, heading."""
+    return (
+        state.distance_m / task.position_tolerance_m,
+        state.speed_m_s / task.speed_tolerance_m_s,
+        state.largest_swing_rad / task.swing_tolerance_rad,
+        abs(state.heading_error_rad) / task.heading_tolerance_rad,
+    )
 
 
-def constraint_margin(state: TaskState, sigma_rad: float) -> Array:
-    """Return σ − ‖z2‖∞, (n,) rad; negative where Eq. (9) is violated."""
-    return sigma_rad - state.largest_swing_rad
+@compiled
+def is_success(state: TaskState, task: Task) -> bool:
+    """Whether all four errors are within their tolerances."""
+    return max(tolerance_shares(state, task)) < 1.0
 
 
-def wrapped(angle: Array) -> Array:
-    """Return the angle in (−π, π]."""
-    return np.arctan2(np.sin(angle), np.cos(angle))
+@compiled
+def constraint_margin(state: TaskState, task: Task) -> float:
+    """Return σ − ‖z2‖∞ in rad; negative where Eq. (9) is violated."""
+    return task.sigma_rad - state.largest_swing_rad
 
 
-def course_error(position: Array, heading_error: Array, blend_radius_m: float) -> Array:
-    """Return how far the robot is off the course that ends with the right heading, (n,) rad.
-
-    A robot that cannot move sideways must be on the right streamline long before the goal; the
-    distance alone says nothing about that.
-
-    Args:
-        position: grasp relative to the goal in axes of the goal's heading, (n, 2) m.
-        heading_error: θ − θ_goal, (n,) rad.
-        blend_radius_m: distance at which streamline and goal heading weigh the same.
-    """
-    squared = (position**2).sum(axis=1)
-    share = squared / (squared + blend_radius_m**2)
-    return np.abs(wrapped(heading_error - share * wrapped(streamline_heading(position))))
-
-
-def potentials(state: TaskState, task: TaskParams) -> dict[str, Array]:
-    """Return the shaping potentials, (n,) each, by the reward term that each one makes.
+@compiled
+def potentials(state: TaskState, task: Task) -> Potentials:
+    """Return the shaping potentials.
 
     Distance and course pull from afar, the height on its own, lest it be left for last; closeness,
     logarithmic in the distance to the goal *set* counted in tolerances, still distinguishes
     hovering near the goal from settling in it.
     """
-    reward = task.reward
-    height = np.abs(state.height_error_m)
-    planar = np.sqrt(np.maximum(state.distance_m**2 - height**2, 0.0))
-    away = np.sqrt((tolerance_shares(state, task) ** 2).sum(axis=0))
-    return {
-        "reward_distance": -reward.distance_weight_per_m * (planar + height),
-        "reward_course": -reward.course_weight_per_rad * state.course_error_rad,
-        "reward_closeness": -reward.closeness_weight * np.log1p(away),
-    }
+    height = abs(state.height_error_m)
+    planar = math.sqrt(max(state.distance_m**2 - height**2, 0.0))
+    position, speed, swing, heading = tolerance_shares(state, task)
+    away = math.sqrt(position**2 + speed**2 + swing**2 + heading**2)
+    return Potentials(
+        distance=-task.weights.distance_weight_per_m * (planar + height),
+        course=-task.weights.course_weight_per_rad * state.course_error_rad,
+        closeness=-task.weights.closeness_weight * math.log1p(away),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """How a step ended, each (n,) bool."""
-
-    success: BoolArray
-    violation: BoolArray
-    left_workspace: BoolArray
-    simulation_failed: BoolArray
-
-    @property
-    def failure(self) -> BoolArray:
-        """Ended for a reason nobody wants."""
-        return self.left_workspace | self.simulation_failed
+@compiled
+def is_failure(outcome: Outcome, margin_rad: float, task: Task) -> bool:
+    """Whether the episode ended for a reason nobody wants."""
+    violated = task.violation_ends and margin_rad < 0
+    return outcome.left_workspace or outcome.simulation_failed or violated
 
 
+@compiled
 def reward_terms(
-    *,
-    before: dict[str, Array],
-    after: dict[str, Array],
-    action: Array,
+    before: Potentials,
+    after: Potentials,
+    squared_action: float,
     outcome: Outcome,
-    violation_ends: bool,
-    excess_share: Array,
-    weights: RewardParams,
-) -> dict[str, Array]:
-    """Return the terms whose sum is the reward, each (n,).
+    margin_rad: float,
+    task: Task,
+) -> RewardTerms:
+    """Return the terms whose sum is the reward.
 
     Args:
         before: potentials one step ago.
         after: potentials now.
-        action: normalized action, (n, k).
+        squared_action: squared norm of the normalized action.
         outcome: how the step ended.
-        violation_ends: whether violating σ terminates the episode.
-        excess_share: max(0, ‖z2‖∞/σ − 1) where it is penalized, else zero, (n,).
-        weights: reward weights.
+        margin_rad: the constraint's margin.
+        task: its constants.
     """
-    failure = outcome.failure | outcome.violation if violation_ends else outcome.failure
-    return {
-        **{name: after[name] - before[name] for name in after},
-        "reward_time": np.full(excess_share.shape, -weights.time_cost_per_step),
-        "reward_effort": -weights.effort_weight * (action**2).sum(axis=-1),
-        "reward_success": weights.success_bonus * outcome.success,
-        "reward_failure": -weights.failure_penalty * failure,
-        "reward_deformation": -weights.deformation_penalty * excess_share,
-    }
+    weights = task.weights
+    excess_share = max(-margin_rad, 0.0) / task.sigma_rad if task.excess_is_penalized else 0.0
+    return RewardTerms(
+        reward_distance=after.distance - before.distance,
+        reward_course=after.course - before.course,
+        reward_closeness=after.closeness - before.closeness,
+        reward_time=-weights.time_cost_per_step,
+        reward_effort=-weights.effort_weight * squared_action,
+        reward_success=weights.success_bonus if outcome.success else 0.0,
+        reward_failure=-weights.failure_penalty if is_failure(outcome, margin_rad, task) else 0.0,
+        reward_deformation=-weights.deformation_penalty * excess_share,
+    )

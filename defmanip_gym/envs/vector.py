@@ -18,7 +18,13 @@ from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
 from defmanip_gym.errors import StartError
-from defmanip_gym.params import BeamParams, DisturbanceParams, RobotParams, TaskParams
+from defmanip_gym.params import (
+    BeamParams,
+    BeamRanges,
+    DisturbanceParams,
+    RobotParams,
+    TaskParams,
+)
 from defmanip_gym.validation import require_choice, require_whole
 
 Array = NDArray[np.float64]
@@ -45,6 +51,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         sigma_rad: see there.
         robot: see there.
         beam: see there.
+        beam_ranges: see there; every episode of the batch draws its own beam.
         nominal_robot: see there.
         nominal_beam: see there.
         task: see there.
@@ -70,6 +77,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         sigma_rad: float = math.pi / 6,
         robot: RobotParams = RobotParams(),
         beam: BeamParams = BeamParams(),
+        beam_ranges: BeamRanges = BeamRanges(),
         nominal_robot: RobotParams | None = None,
         nominal_beam: BeamParams | None = None,
         task: TaskParams = TaskParams(),
@@ -92,6 +100,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             sigma_rad=sigma_rad,
             robot=robot,
             beam=beam,
+            beam_ranges=beam_ranges,
             nominal_robot=nominal_robot,
             nominal_beam=nominal_beam,
             task=task,
@@ -139,25 +148,21 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         """Advance every episode by one control period."""
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._ended.any():
             return self._step_after_reset(actions)
-        result = self.engine.step(actions)
-        truncated = (self.engine.steps >= self.max_episode_steps) & ~result.terminated
-        self._ended = result.terminated | truncated
-        observation, info = result.observation, result.info
+        scores = self.engine.step(actions)
+        truncated = (self.engine.steps >= self.max_episode_steps) & ~scores.terminated
+        self._ended = scores.terminated | truncated
+        observation, info = scores.observations, self.engine.info
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            final_info = info
-            final_obs = observation
-            observation, fresh = self.engine.reset(np.flatnonzero(self._ended))
-            keep = ~self._ended
-            observation[keep] = final_obs[keep]
-            info = {key: np.where(keep, final_info[key], fresh[key]) for key in final_info}
-            info |= {
-                "final_obs": final_obs,
-                "_final_obs": self._ended.copy(),
-                "final_info": final_info,
+            final = {
+                "final_obs": observation,
+                "_final_obs": self._ended,
+                "final_info": info,
                 "_final_info": self._ended.copy(),
             }
+            observation, info = self.engine.reset(np.flatnonzero(self._ended))
+            info |= final
             self._ended = np.zeros(self.num_envs, dtype=bool)
-        return observation, result.reward, result.terminated, truncated, info
+        return observation, scores.rewards, scores.terminated, truncated, info
 
     def _masked(self, mask: Any) -> NDArray[np.intp]:
         values = np.asarray(mask)
@@ -174,16 +179,13 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self, actions: Array
     ) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
         """Step the running episodes and start those that ended in the previous step."""
-        fresh_ids = np.flatnonzero(self._ended)
-        fresh = self._ended.copy()
-        result = self.engine.step(np.where(fresh[:, None], 0.0, actions))
-        observation, start_info = self.engine.reset(fresh_ids)
-        observation[~fresh] = result.observation[~fresh]
-        truncated = (self.engine.steps >= self.max_episode_steps) & ~result.terminated & ~fresh
-        terminated = result.terminated & ~fresh
+        fresh = self._ended
+        scores = self.engine.step(np.where(fresh[:, None], 0.0, actions))
+        observation, info = self.engine.reset(np.flatnonzero(fresh))
+        truncated = (self.engine.steps >= self.max_episode_steps) & ~scores.terminated & ~fresh
+        terminated = scores.terminated & ~fresh
         self._ended = terminated | truncated
-        info = {key: np.where(fresh, start_info[key], result.info[key]) for key in result.info}
-        return observation, np.where(fresh, 0.0, result.reward), terminated, truncated, info
+        return observation, np.where(fresh, 0.0, scores.rewards), terminated, truncated, info
 
     def render(self) -> tuple[Any, ...] | None:
         """Return an image of each episode."""

@@ -3,29 +3,61 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.robot_model import ArmLengths, reach_and_height
 
 Array = NDArray[np.float64]
 
 
-def in_workspace(base_pose: Array, joints: Array, config: TransportConfig) -> NDArray[np.bool_]:
-    """Whether the base is in the arena and the arm clear of its singularities, (n,).
+class Workspace(NamedTuple):
+    """Where the robot may be; see ``TaskParams`` (compiled code takes named tuples)."""
+
+    arm: ArmLengths
+    center_x_m: float
+    center_y_m: float
+    arena_radius_m: float
+    smallest_elbow_bend_rad: float
+    smallest_reach_m: float
+    smallest_grasp_height_m: float
+
+
+def workspace_of(config: TransportConfig) -> Workspace:
+    """Return the workspace of an environment."""
+    task = config.task
+    return Workspace(
+        arm=ArmLengths.of(config.robot),
+        center_x_m=float(task.goal[0]),
+        center_y_m=float(task.goal[1]),
+        arena_radius_m=float(task.arena_radius_m),
+        smallest_elbow_bend_rad=float(task.smallest_elbow_bend_rad),
+        smallest_reach_m=float(task.smallest_reach_m),
+        smallest_grasp_height_m=float(task.smallest_grasp_height_m),
+    )
+
+
+@compilable
+def in_workspace(base_pose: Array, upper: Numbers, fore: Numbers, space: Workspace) -> Numbers:
+    """Whether the base is in the arena and the arm clear of its singularities, (...).
 
     Args:
-        base_pose: (n, 3).
-        joints: q_a, (n, 2) rad; the elbow must point up, −π < q2 < 0.
-        config: limits and geometry.
+        base_pose: (..., 3).
+        upper: α1, (...) rad.
+        fore: α2, (...) rad; the elbow must point up, −π < α2 − α1 < 0.
+        space: the workspace.
     """
-    task = config.task
-    grasp = ArmKinematics(config.robot).reach_and_height(joints @ JOINT_TO_PITCH.T)
-    x, y = task.goal[:2]
-    arena = np.hypot(base_pose[:, 0] - x, base_pose[:, 1] - y) < task.arena_radius_m
-    bend = task.smallest_elbow_bend_rad
-    elbow = (joints[:, 1] < -bend) & (joints[:, 1] > bend - math.pi)
-    clear = (grasp[:, 0] > task.smallest_reach_m) & (grasp[:, 1] > task.smallest_grasp_height_m)
-    return np.asarray(arena & elbow & clear)
+    x, y = base_pose[..., 0] - space.center_x_m, base_pose[..., 1] - space.center_y_m
+    reach, height = reach_and_height(space.arm, upper, fore)
+    elbow, bend = fore - upper, space.smallest_elbow_bend_rad
+    return (
+        (np.hypot(x, y) < space.arena_radius_m)
+        & (elbow < -bend)
+        & (elbow > bend - math.pi)
+        & (reach > space.smallest_reach_m)
+        & (height > space.smallest_grasp_height_m)
+    )

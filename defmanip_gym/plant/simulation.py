@@ -3,52 +3,27 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from math import cos, sin
 
 import mujoco
 import numpy as np
 from mujoco import batch
 from numpy.typing import NDArray
 
+from defmanip_gym.compiled import compiled, machine_code
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant import names
+from defmanip_gym.plant.beam_variation import BeamVariation
 from defmanip_gym.plant.builder import build_model
+from defmanip_gym.plant.plant_state import PlantState, read_state
 
 Array = NDArray[np.float64]
 
-# MuJoCo answers a diverged state with a silent reset; only these counters tell.
-_DIVERGENCE = [
-    mujoco.mjtWarning.mjWARN_BADQPOS.value,
-    mujoco.mjtWarning.mjWARN_BADQVEL.value,
-    mujoco.mjtWarning.mjWARN_BADQACC.value,
-]
-_ACCELERATION_STAGE = mujoco.mjtStage.mjSTAGE_ACC.value
-_NO_STAGE = mujoco.mjtStage.mjSTAGE_NONE.value
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlantState:
-    """What the plant's sensors and encoders see; n simulations, N segments.
-
-    Attributes:
-        base_pose: (x, y, θ), (n, 3) m, m, rad, world frame.
-        base_velocity: (u1, u2), (n, 2) m/s, rad/s.
-        lateral_speed: slip of the base to its left, (n,) m/s.
-        joints: q_a, (n, 2) rad.
-        joint_rates: q̇_a, (n, 2) rad/s.
-        swing: φ, (n, N) rad from the vertical.
-        swing_rate: φ̇, (n, N) rad/s.
-        grasp_force_b: force on the object at the grasp, (n, 3) N, base frame.
-    """
-
-    base_pose: Array
-    base_velocity: Array
-    lateral_speed: Array
-    joints: Array
-    joint_rates: Array
-    swing: Array
-    swing_rate: Array
-    grasp_force_b: Array
+# MuJoCo answers a diverged state with a silent reset of simulation and warning counters. A counter
+# of something that cannot happen here, once set, tells of it by being zero again. Counters that
+# are not zero also keep MuJoCo from writing warnings to the terminal and to MUJOCO_LOG.TXT.
+_SENTINEL = mujoco.mjtWarning.mjWARN_CONTACTFULL.value
 
 
 class Simulation:
@@ -78,51 +53,67 @@ class Simulation:
         )
         threads = min(count, num_threads or os.cpu_count() or 1)
         self._batch = batch.Batch(self.model, count, nthread=threads)
+        self._pristine = self._batch.state[0].copy()
+        self._variation = BeamVariation(self._batch, beam)
         self._position: Array = self._batch.bind("qpos")
         self._velocity: Array = self._batch.bind("qvel")
         control: Array = self._batch.bind("ctrl")
         self._control = control[:, : len(names.ACTUATORS)]
         self._lateral_target = control[:, self.model.actuator(names.NO_SLIP).id]
         self._external: Array = self._batch.bind("xfrc_applied")
-        self._force: Array = self._batch.bind("sensordata")
+        self._sensed_force: Array = self._batch.bind("sensordata")
+        self._grasp_force_s = np.zeros((count, 3))
+        self._readings = np.zeros((count, 1, 3))
         self._forearm = self.model.body(names.FOREARM).id
         self._forearm_com_m = float(self.model.body(names.FOREARM).ipos[0])
         self._forearm_length_m = robot.forearm.length_m
-        self._divergences = np.zeros(count, dtype=np.int64)
+        self._warnings: NDArray[np.int32] = self._batch.warning[:, :, 1]
+        self._warnings[:] = 1
+        self._sentinel = self._warnings[:, _SENTINEL]
+        self._segments, self._period_s = beam.segment_count, float(physics_period_s)
+        self._read = machine_code(
+            read_state,
+            self._position,
+            self._velocity,
+            self._grasp_force_s,
+            PlantState.empty(count, self._segments),
+        )
+        self._lead = machine_code(
+            _lead_no_slip, self._position, self._velocity, self._period_s, self._lateral_target
+        )
+        self._extrapolate = machine_code(_extrapolate, self._readings, self._grasp_force_s)
         self.count = count
 
     def read(self) -> PlantState:
-        """Return copies of the current state and the grasp force at this instant."""
-        position, velocity = self._position, self._velocity
-        heading = position[:, 2]
-        cos, sin = np.cos(heading), np.sin(heading)
-        x_dot, y_dot = velocity[:, 0], velocity[:, 1]
-        pitch, pitch_rate = position[:, 3:].cumsum(axis=1), velocity[:, 3:].cumsum(axis=1)
-        swing = pitch[:, 2:]
-        return PlantState(
-            base_pose=position[:, :3].copy(),
-            base_velocity=np.stack((cos * x_dot + sin * y_dot, velocity[:, 2]), axis=1),
-            lateral_speed=cos * y_dot - sin * x_dot,
-            joints=position[:, 3:5].copy(),
-            joint_rates=velocity[:, 3:5].copy(),
-            swing=swing,
-            swing_rate=pitch_rate[:, 2:],
-            grasp_force_b=_pitched(self._force, swing[:, 0]),
-        )
+        """Return the current state and the grasp force at this instant."""
+        state = PlantState.empty(self.count, self._segments)
+        self.read_into(state)
+        return state
+
+    def read_into(self, state: PlantState) -> None:
+        """Fill in a state of n simulations."""
+        self._read(self._position, self._velocity, self._grasp_force_s, state)
+
+    def carry(self, ids: NDArray[np.intp], beams: Sequence[BeamParams]) -> None:
+        """Let simulations carry other beams than the given one; place them afterwards.
+
+        Raises:
+            ParameterError: beams that differ in more than damping, mass and length.
+        """
+        self._variation.set(ids, beams)
 
     def place(self, ids: NDArray[np.intp], pose: Array, joints: Array, swing: Array) -> None:
         """Put simulations at rest: ``pose`` (k, 3), ``joints`` (k, 2), ``swing`` (k, N)."""
-        self._batch.reset(ids, stage=_NO_STAGE)
-        self._batch.warning[ids] = 0
-        self._divergences[ids] = 0
-        pitch = np.concatenate((joints.sum(axis=1, keepdims=True), swing), axis=1)
-        self._position[ids] = np.concatenate((pose, joints, np.diff(pitch, axis=1)), axis=1)
-        self._velocity[ids] = 0.0
+        self._batch.state[ids] = self._pristine  # what Batch.reset does, a hundred times faster
+        self._warnings[ids] = 1
+        angles = np.concatenate((pose, joints, swing), axis=1, dtype=np.float64)
+        _place(ids, angles, self._position)
 
     def hold(self, ids: NDArray[np.intp], generalized_forces: Array) -> None:
         """Set T_r of simulations, (k, 4), and compute the forces it causes, without stepping."""
         self._control[ids] = generalized_forces
         self._batch.forward(ids)
+        self._grasp_force_s[ids] = self._sensed_force[ids]
 
     def apply(self, generalized_forces: Array) -> None:
         """Set T_r = (f_b, α_b, τ1, τ2), (n, 4); the actuator limits clip it."""
@@ -130,61 +121,86 @@ class Simulation:
 
     def push_grasp(self, force_b: Array) -> None:
         """Let a force act on the end effector, (n, 3) N in the base frame, until set anew."""
-        heading = self._position[:, 2]
-        pitch = self._position[:, 3] + self._position[:, 4]
-        cos, sin = np.cos(heading), np.sin(heading)
-        force = np.stack(
-            (
-                cos * force_b[:, 0] - sin * force_b[:, 1],
-                sin * force_b[:, 0] + cos * force_b[:, 1],
-                force_b[:, 2],
-            ),
-            axis=1,
-        )
         arm = self._forearm_length_m - self._forearm_com_m
-        out, up = arm * np.cos(pitch), arm * np.sin(pitch)
-        external = self._external[:, self._forearm]
-        external[:, :3] = force
-        # lever × force by components: np.cross costs more than all the rest
-        external[:, 3] = out * sin * force[:, 2] - up * force[:, 1]
-        external[:, 4] = up * force[:, 0] - out * cos * force[:, 2]
-        external[:, 5] = out * (cos * force[:, 1] - sin * force[:, 0])
+        _push(self._position, force_b, arm, self._external[:, self._forearm])
 
     def step(self, substeps: int) -> NDArray[np.bool_]:
         """Advance all simulations; return which of them diverged, (n,).
 
         A simulation that diverged holds a meaningless state until it is placed again.
         """
-        failed = np.zeros(self.count, dtype=bool)
-        # the no-slip force acts along the axle at the start of a step, and the base has turned by
-        # u2 h at its end: without this lead it would slip by u1 u2 h, 5 mm/s at 1 m/s and 1 rad/s
-        heading, velocity = self._position[:, 2], self._velocity
-        forward = np.cos(heading) * velocity[:, 0] + np.sin(heading) * velocity[:, 1]
-        self._lateral_target[:] = forward * velocity[:, 2] * self.model.opt.timestep
+        self._lead(self._position, self._velocity, self._period_s, self._lateral_target)
+        failed = np.zeros(self.count, dtype=np.bool_)
+        if self._readings.shape[1] != substeps:
+            self._readings = np.empty((self.count, substeps, 3))
         try:
-            # the extra stage makes the force that of this instant, not of one substep ago
-            self._batch.step(nstep=substeps, stage=_ACCELERATION_STAGE)
+            # The sensor lags the state by one substep, which the force loop would take for
+            # damping, and a forward pass after each period would cost a fifth of the physics. The
+            # last two readings, under the same controls, give the force of this instant to O(h²).
+            self._batch.rollout(
+                substeps, record=("sensordata",), out={"sensordata": self._readings}
+            )
+            if substeps == 1:
+                self._batch.forward()
         except batch.SimulationError as error:
             failed[error.ids] = True
-        divergences = self._batch.warning[:, _DIVERGENCE, 1].sum(axis=1)
-        failed |= divergences > self._divergences
-        self._divergences[:] = divergences
+        if substeps == 1:
+            self._grasp_force_s[:] = self._sensed_force
+        else:
+            self._extrapolate(self._readings, self._grasp_force_s)
+        failed |= self._sentinel == 0
         return failed
 
-    def materialize(self, index: int, data: mujoco.MjData) -> None:
-        """Write one simulation's state into ``data`` and complete it, for rendering."""
+    def materialize(self, index: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Write one simulation's beam and state into a copy of the model and its data, to draw."""
+        self._variation.write_to(model, index)
         self._batch.get_data(index, data)
-        mujoco.mj_forward(self.model, data)
+        mujoco.mj_forward(model, data)
 
 
-def _pitched(force_s: Array, swing: Array) -> Array:
-    """Turn forces from the first segment's frame, pitched by its swing, into the base frame."""
-    cos, sin = np.cos(swing), np.sin(swing)
-    return np.stack(
-        (
-            cos * force_s[:, 0] - sin * force_s[:, 2],
-            force_s[:, 1],
-            sin * force_s[:, 0] + cos * force_s[:, 2],
-        ),
-        axis=1,
-    )
+@compiled
+def _lead_no_slip(position: Array, velocity: Array, period_s: float, target: Array) -> None:
+    """Set the lateral velocity that the no-slip force is to reach.
+
+    It acts along the axle at the start of a step, and the base has turned by u2 h at its end:
+    without this lead it would slip by u1 u2 h, 5 mm/s at 1 m/s and 1 rad/s.
+    """
+    for i in range(len(target)):
+        heading = position[i, 2]
+        forward = cos(heading) * velocity[i, 0] + sin(heading) * velocity[i, 1]
+        target[i] = forward * velocity[i, 2] * period_s
+
+
+@compiled
+def _place(ids: NDArray[np.intp], angles: Array, position: Array) -> None:
+    """Write qpos, (n, 5 + N), for rows (x, y, θ, q_a, φ): a hinge turns relative to its parent."""
+    for row, i in enumerate(ids):
+        for k in range(5):
+            position[i, k] = angles[row, k]
+        pitch = angles[row, 3] + angles[row, 4]
+        for k in range(5, position.shape[1]):
+            position[i, k] = angles[row, k] - pitch
+            pitch = angles[row, k]
+
+
+@compiled
+def _extrapolate(readings: Array, force: Array) -> None:
+    """Carry readings (n, substeps, 3) one substep beyond the last."""
+    for i in range(len(force)):
+        for k in range(3):
+            force[i, k] = 2 * readings[i, -1, k] - readings[i, -2, k]
+
+
+@compiled
+def _push(position: Array, force_b: Array, arm_m: float, wrench: Array) -> None:
+    """Write force and torque about the forearm's centre of mass, world frame, (n, 6)."""
+    for i in range(len(wrench)):
+        heading, pitch = position[i, 2], position[i, 3] + position[i, 4]
+        c, s = cos(heading), sin(heading)
+        x, y = c * force_b[i, 0] - s * force_b[i, 1], s * force_b[i, 0] + c * force_b[i, 1]
+        z = force_b[i, 2]
+        out, up = arm_m * cos(pitch), arm_m * sin(pitch)
+        wrench[i, 0], wrench[i, 1], wrench[i, 2] = x, y, z
+        wrench[i, 3] = out * s * z - up * y
+        wrench[i, 4] = up * x - out * c * z
+        wrench[i, 5] = out * (c * y - s * x)

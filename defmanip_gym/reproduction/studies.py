@@ -94,7 +94,7 @@ def _swing(
         if engine.largest_swing_rad[0] > SIGMA_RAD:
             break
         action, memory = controller.predict(observation, memory)
-        observation = engine.step(action).observation
+        observation = engine.step(action).observations
     time_s, swing, swing_rate = np.array(rows).T
     return time_s, swing, swing_rate
 

@@ -17,9 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from defmanip_gym.baselines.cascade import Cascade, GraspSample, LoopMemory
-from defmanip_gym.envs.snapshot import Snapshot, Surveyor
+from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import DivergenceError
-from defmanip_gym.plant.simulation import PlantState, Simulation
+from defmanip_gym.evaluation.readings import heading_error, position_from_goal
+from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.plant.plant_state import PlantState
+from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.reproduction.course import POSITION, VELOCITY, Course, CourseRecorder
 from defmanip_gym.reproduction.local_model import LocalModel, local_model
 from defmanip_gym.reproduction.setting import LoopStage, PaperSetting
@@ -44,7 +47,7 @@ class PaperLoop:
         self._setting, self._config = setting, config
         self._physics_period_s = config.task.physics_period_s
         self._kinematics = ArmKinematics(config.robot)
-        self._surveyor = Surveyor(config)
+        self._layout = ObservationLayout(config.beam.segment_count)
         reach = config.goal_reach_and_height_m[0]
         self._linearization = FeedbackLinearization(
             config.believed_robot,
@@ -77,8 +80,9 @@ class PaperLoop:
     def advance(self) -> Array:
         """Run the outer loop once; return its instant in a course's columns, (15,)."""
         plant = self._simulation.read()
-        now = self._surveyor.snapshot(plant)
-        u_o = self._cascade.tracking(self._sample(now))
+        observation = clean_observations(self._config, plant)
+        sample = self._sample(plant, observation)
+        u_o = self._cascade.tracking(sample)
         error_model = local_model(self._error_function, _error_inputs(self._midway, u_o)[0])
         inputs = _force_inputs(np.zeros((1, 3)), plant)[0]
         force_model = local_model(self._force_function, inputs)
@@ -88,8 +92,8 @@ class PaperLoop:
             plant.base_pose,
             plant.joints,
             plant.swing,
-            base_to_world(-now.goal_offset_b, plant.base_pose[:, 2]),
-            now.grasp_velocity_b,
+            base_to_world(-self._layout.part(observation, "goal_offset_b"), plant.base_pose[:, 2]),
+            sample.velocity_b,
             self._force_error,
         )
         return np.concatenate(columns, axis=1)[0]
@@ -135,12 +139,11 @@ class PaperLoop:
         push = disturbance.force_bias_n + disturbance.force_amplitude_n * math.sin(phase)
         return np.full((1, 3), push)
 
-    def _sample(self, now: Snapshot) -> GraspSample:
-        plant = now.plant
+    def _sample(self, plant: PlantState, observation: Array) -> GraspSample:
         return GraspSample(
-            position=base_to_world(-now.goal_offset_b, now.task.heading_error_rad),
-            heading=now.task.heading_error_rad,
-            velocity_b=now.grasp_velocity_b,
+            position=position_from_goal(observation, self._layout),
+            heading=heading_error(observation, self._layout),
+            velocity_b=self._layout.part(observation, "grasp_velocity_b"),
             yaw_rate=plant.base_velocity[:, 1],
             reach=self._kinematics.reach_and_height(plant.joints @ JOINT_TO_PITCH.T)[:, 0],
             swing=plant.swing,

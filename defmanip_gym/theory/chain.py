@@ -4,16 +4,20 @@ Every arm link and every beam segment is a link in the vertical plane through th
 absolute pitch angles α and quasi-velocities v = (u1, u2, α̇) the dynamics are M(α) v̇ + h(α, v) =
 generalized forces. The nonholonomic constraint is built in: v has no lateral speed. Derivation:
 docs/derivations.md.
+
+With A_ij the distance that link j puts between base axis and centre of mass i, all of it depends
+on two constants: p_j = Σ_i m_i A_ij and W_jk = Σ_i m_i A_ij A_ik.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.compiled import compiled
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, LinkParams, RobotParams
 
 Array = NDArray[np.float64]
@@ -56,20 +60,26 @@ def beam_links(beam: BeamParams) -> tuple[Link, ...]:
     return (segment,) * beam.segment_count
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChainTerms:
-    """What the chain's dynamics share at one state.
+class ChainConstants(NamedTuple):
+    """What the dynamics of a chain of L links depend on (compiled code takes named tuples).
 
-    Shapes for L links: ``jacobian_r``, ``jacobian_z`` (..., L, L) map α̇ to the velocities of the
-    centres of mass; ``r``, ``r_dot``, ``r_bias``, ``z_bias`` are (..., L) in m, m/s, m/s².
+    Attributes:
+        total_mass: of base and links, kg.
+        base_yaw_inertia: kg·m².
+        first_moments: p, (L,) kg·m: what gravity and forward acceleration act on.
+        second_moments: W, (L, L) kg·m².
+        constant_inertia: (L, L) kg·m², the links' own inertia and the rotors'.
+        transverse: own inertia of each link across its axis, (L,) kg·m².
+        axial: about its axis, (L,) kg·m².
     """
 
-    jacobian_r: Array
-    jacobian_z: Array
-    r: Array
-    r_dot: Array
-    r_bias: Array
-    z_bias: Array
+    total_mass: float
+    base_yaw_inertia: float
+    first_moments: Array
+    second_moments: Array
+    constant_inertia: Array
+    transverse: Array
+    axial: Array
 
 
 class YawingChain:
@@ -92,94 +102,116 @@ class YawingChain:
     ) -> None:
         count = len(links)
         lengths = np.array([link.length_m for link in links])
-        self.link_count = count
-        self.masses = np.array([link.mass_kg for link in links])
-        self.transverse = np.array([link.transverse_inertia_kgm2 for link in links])
-        self.axial = np.array([link.axial_inertia_kgm2 for link in links])
+        masses = np.array([link.mass_kg for link in links])
+        transverse = np.array([link.transverse_inertia_kgm2 for link in links])
         # row i: the lengths of the links before i, then the distance of its own centre of mass
-        self.geometry = np.tril(np.tile(lengths, (count, 1)), -1) + np.diag(
-            [k.com_m for k in links]
-        )
-        self.base_mass = base_mass_kg
-        self.base_yaw_inertia = base_yaw_inertia_kgm2
-        self._constant_inertia = np.diag(self.transverse)
+        geometry = np.tril(np.tile(lengths, (count, 1)), -1) + np.diag([k.com_m for k in links])
+        constant_inertia = np.diag(transverse)
         if rotor_inertia is not None:
-            self._constant_inertia = self._constant_inertia + rotor_inertia
-
-    @cached_property
-    def first_moments(self) -> Array:
-        """Σ_i m_i A_ik, shape (L,), in kg·m: what gravity and forward acceleration act on."""
-        return self.masses @ self.geometry
-
-    def terms(self, alpha: Array, alpha_dot: Array) -> ChainTerms:
-        """Return positions, Jacobians and bias accelerations; α (..., L) rad, α̇ rad/s."""
-        cos, sin = np.cos(alpha), np.sin(alpha)
-        jacobian_r = -self.geometry * sin[..., None, :]
-        squared = alpha_dot**2
-        return ChainTerms(
-            jacobian_r=jacobian_r,
-            jacobian_z=self.geometry * cos[..., None, :],
-            r=self._along(cos),
-            r_dot=np.einsum("...ik,...k->...i", jacobian_r, alpha_dot),
-            r_bias=-self._along(cos * squared),
-            z_bias=-self._along(sin * squared),
+            constant_inertia = constant_inertia + rotor_inertia
+        self.link_count = count
+        self.constants = ChainConstants(
+            total_mass=float(base_mass_kg + masses.sum()),
+            base_yaw_inertia=float(base_yaw_inertia_kgm2),
+            first_moments=masses @ geometry,
+            second_moments=geometry.T @ (masses[:, None] * geometry),
+            constant_inertia=constant_inertia,
+            transverse=transverse,
+            axial=np.array([link.axial_inertia_kgm2 for link in links]),
         )
 
-    def pitch_inertia(self, terms: ChainTerms) -> Array:
-        """Return M_αα, shape (..., L, L), kg·m²."""
-        weighted_r = terms.jacobian_r * self.masses[:, None]
-        weighted_z = terms.jacobian_z * self.masses[:, None]
-        return (
-            np.einsum("...ij,...ik->...jk", terms.jacobian_r, weighted_r)
-            + np.einsum("...ij,...ik->...jk", terms.jacobian_z, weighted_z)
-            + self._constant_inertia
-        )
+    def mass_matrix(self, alpha: Array) -> Array:
+        """Return M(α), (..., 2 + L, 2 + L), for v = (u1, u2, α̇); ``alpha`` (..., L) rad."""
+        size = 2 + self.link_count
+        matrix = np.empty((*np.shape(alpha)[:-1], size, size))
+        _mass_matrices(self.constants, _rows(alpha), matrix.reshape(-1, size, size))
+        return matrix
 
-    def pitch_bias(self, alpha: Array, terms: ChainTerms, u2: Array) -> Array:
-        """Return h_α without gravity, (..., L) in N·m, at yaw rate ``u2`` (...) in rad/s."""
-        u2_squared = np.asarray(u2)[..., None] ** 2
-        forward = terms.r_bias - terms.r * u2_squared
-        return (
-            np.einsum("...ik,...i->...k", terms.jacobian_r, self.masses * forward)
-            + np.einsum("...ik,...i->...k", terms.jacobian_z, self.masses * terms.z_bias)
-            - 0.5 * self._yaw_inertia_slope(alpha) * u2_squared
-        )
+    def velocity_bias(self, alpha: Array, velocity: Array) -> Array:
+        """Return h(α, v) without gravity, (..., 2 + L); ``velocity`` is v, (..., 2 + L)."""
+        rows = _rows(velocity)
+        bias = np.empty_like(rows)
+        _velocity_biases(self.constants, _rows(alpha), rows, bias)
+        return bias.reshape(np.shape(velocity))
 
     def gravity_torque(self, alpha: Array) -> Array:
         """Return the gravity part of h_α, (..., L) in N·m."""
-        return GRAVITY_M_S2 * self.first_moments * np.cos(alpha)
+        return GRAVITY_M_S2 * self.constants.first_moments * np.cos(alpha)
 
-    def mass_matrix(self, alpha: Array, terms: ChainTerms | None = None) -> Array:
-        """Return M(α), shape (..., 2 + L, 2 + L), for v = (u1, u2, α̇)."""
-        if terms is None:
-            terms = self.terms(alpha, np.zeros_like(alpha))
-        size = 2 + self.link_count
-        matrix = np.zeros((*np.shape(alpha)[:-1], size, size))
-        coupling = np.einsum("i,...ik->...k", self.masses, terms.jacobian_r)
-        axial_share = self.transverse * np.cos(alpha) ** 2 + self.axial * np.sin(alpha) ** 2
-        matrix[..., 0, 0] = self.base_mass + self.masses.sum()
-        matrix[..., 0, 2:] = coupling
-        matrix[..., 2:, 0] = coupling
-        matrix[..., 1, 1] = self.base_yaw_inertia + (self.masses * terms.r**2 + axial_share).sum(-1)
-        matrix[..., 2:, 2:] = self.pitch_inertia(terms)
-        return matrix
-
-    def bias(self, alpha: Array, velocity: Array, terms: ChainTerms | None = None) -> Array:
-        """Return h(α, v) with gravity, shape (..., 2 + L); ``velocity`` is v, (..., 2 + L)."""
-        u1, u2, alpha_dot = velocity[..., 0], velocity[..., 1], velocity[..., 2:]
-        if terms is None:
-            terms = self.terms(alpha, alpha_dot)
-        bias = np.empty_like(velocity)
-        bias[..., 0] = (self.masses * (terms.r_bias - terms.r * u2[..., None] ** 2)).sum(-1)
-        bias[..., 1] = u2 * (
-            (self.masses * terms.r * (2 * terms.r_dot + u1[..., None])).sum(-1)
-            + (self._yaw_inertia_slope(alpha) * alpha_dot).sum(-1)
-        )
-        bias[..., 2:] = self.pitch_bias(alpha, terms, u2) + self.gravity_torque(alpha)
+    def bias(self, alpha: Array, velocity: Array) -> Array:
+        """Return h(α, v) with gravity, (..., 2 + L)."""
+        bias = self.velocity_bias(alpha, velocity)
+        bias[..., 2:] += self.gravity_torque(alpha)
         return bias
 
-    def _along(self, values: Array) -> Array:
-        return np.einsum("ik,...k->...i", self.geometry, values)
 
-    def _yaw_inertia_slope(self, alpha: Array) -> Array:
-        return 2 * (self.axial - self.transverse) * np.sin(alpha) * np.cos(alpha)
+@compiled
+def mass_matrix_at(chain: ChainConstants, cosine: Array, sine: Array, M: Array) -> None:
+    """Write M(α) of one state into ``M``, (2 + L, 2 + L).
+
+    Args:
+        chain: its constants.
+        cosine: cos α, (L,).
+        sine: sin α, (L,).
+        M: the result.
+    """
+    p, W = chain.first_moments, chain.second_moments
+    yaw_inertia = chain.base_yaw_inertia
+    for j in range(len(cosine)):
+        M[0, 2 + j] = M[2 + j, 0] = -p[j] * sine[j]
+        M[1, 2 + j] = M[2 + j, 1] = 0.0
+        yaw_inertia += chain.transverse[j] * cosine[j] ** 2 + chain.axial[j] * sine[j] ** 2
+        for k in range(len(cosine)):
+            yaw_inertia += W[j, k] * cosine[j] * cosine[k]
+            # cos(α_j − α_k)
+            turned = cosine[j] * cosine[k] + sine[j] * sine[k]
+            M[2 + j, 2 + k] = W[j, k] * turned + chain.constant_inertia[j, k]
+    M[0, 0], M[1, 1], M[0, 1], M[1, 0] = chain.total_mass, yaw_inertia, 0.0, 0.0
+
+
+@compiled
+def velocity_bias_at(
+    chain: ChainConstants, cosine: Array, sine: Array, velocity: Array, h: Array
+) -> None:
+    """Write h(α, v) of one state without gravity into ``h``, (2 + L,).
+
+    Args:
+        chain: its constants.
+        cosine: cos α, (L,).
+        sine: sin α, (L,).
+        velocity: v = (u1, u2, α̇), (2 + L,).
+        h: the result.
+    """
+    p, W = chain.first_moments, chain.second_moments
+    u1, u2, alpha_dot = velocity[0], velocity[1], velocity[2:]
+    h[0] = coriolis = 0.0
+    for j in range(len(cosine)):
+        h[0] -= p[j] * cosine[j] * (alpha_dot[j] ** 2 + u2**2)
+        slope = (chain.axial[j] - chain.transverse[j]) * sine[j] * cosine[j]
+        coriolis += p[j] * cosine[j] * u1 + 2 * slope * alpha_dot[j]
+        h[2 + j] = -slope * u2**2
+        for k in range(len(cosine)):
+            coriolis -= 2 * W[j, k] * cosine[j] * sine[k] * alpha_dot[k]
+            h[2 + j] += W[j, k] * sine[j] * cosine[k] * u2**2
+            # sin(α_j − α_k)
+            turned = sine[j] * cosine[k] - cosine[j] * sine[k]
+            h[2 + j] += W[j, k] * turned * alpha_dot[k] ** 2
+    h[1] = u2 * coriolis
+
+
+@compiled
+def _mass_matrices(chain: ChainConstants, alpha: Array, M: Array) -> None:
+    cosine, sine = np.cos(alpha), np.sin(alpha)
+    for i in range(len(alpha)):
+        mass_matrix_at(chain, cosine[i], sine[i], M[i])
+
+
+@compiled
+def _velocity_biases(chain: ChainConstants, alpha: Array, velocity: Array, h: Array) -> None:
+    cosine, sine = np.cos(alpha), np.sin(alpha)
+    for i in range(len(alpha)):
+        velocity_bias_at(chain, cosine[i], sine[i], velocity[i], h[i])
+
+
+def _rows(values: Array) -> Array:
+    return np.ascontiguousarray(values, dtype=np.float64).reshape(-1, np.shape(values)[-1])

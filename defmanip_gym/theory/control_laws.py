@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
+from defmanip_gym.compiled import compiled
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.validation import require_non_negative
 
@@ -57,7 +59,7 @@ def integrate_unless_saturated(
     return error_integral + period_s * np.where(pushes_out, 0.0, error)
 
 
-def limit_speed(w: Array, velocity: Array, max_speed: float | Array, period_s: float) -> Array:
+def limit_speed(w: Array, velocity: Array, max_speed: float, period_s: float) -> Array:
     """Return w changed as little as needed to keep the grasp below a speed one period ahead.
 
     Braking passes unchanged, also from above the limit, and the result is never longer than w.
@@ -68,9 +70,27 @@ def limit_speed(w: Array, velocity: Array, max_speed: float | Array, period_s: f
         max_speed: the limit, m/s.
         period_s: control period.
     """
-    ahead = velocity + period_s * w
-    speed_ahead = np.sqrt((ahead**2).sum(-1))
-    allowed = np.maximum(max_speed, np.sqrt((velocity**2).sum(-1)))
-    too_fast = speed_ahead > allowed
-    shrink = np.where(too_fast, allowed / np.where(too_fast, speed_ahead, 1.0), 1.0)
-    return np.where(too_fast[..., None], (ahead * shrink[..., None] - velocity) / period_s, w)
+    limited = np.array(w, dtype=np.float64)
+    along = np.ascontiguousarray(velocity, dtype=np.float64)
+    _limit_speeds(limited.reshape(-1, 3), along.reshape(-1, 3), float(max_speed), float(period_s))
+    return limited
+
+
+@compiled
+def limit_speed_at(w: Array, velocity: Array, max_speed: float, period_s: float) -> None:
+    """Do so for one state, (3,), in place."""
+    squared_now = squared_ahead = 0.0
+    for k in range(3):
+        squared_now += velocity[k] ** 2
+        squared_ahead += (velocity[k] + period_s * w[k]) ** 2
+    speed_ahead, allowed = sqrt(squared_ahead), max(max_speed, sqrt(squared_now))
+    if speed_ahead > allowed:
+        shrink = allowed / speed_ahead
+        for k in range(3):
+            w[k] = ((velocity[k] + period_s * w[k]) * shrink - velocity[k]) / period_s
+
+
+@compiled
+def _limit_speeds(w: Array, velocity: Array, max_speed: float, period_s: float) -> None:
+    for i in range(len(w)):
+        limit_speed_at(w[i], velocity[i], max_speed, period_s)

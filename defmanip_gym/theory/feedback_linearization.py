@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from math import cos, sin
+from typing import NamedTuple
+
 import numpy as np
 
-from defmanip_gym.params import BeamParams, RobotParams
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.compiled import compiled
+from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
+from defmanip_gym.theory.chain import Array, ChainConstants, mass_matrix_at, velocity_bias_at
 from defmanip_gym.theory.object_model import HangingBeam, hanging_pitch
-from defmanip_gym.theory.redundancy import RedundancyResolution
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, robot_chain
+from defmanip_gym.theory.redundancy import ReachRule, RedundancyResolution, shared_acceleration
+from defmanip_gym.theory.robot_model import ArmLengths, robot_chain
+
+
+class NominalModel(NamedTuple):
+    """What the feedback linearization believes (compiled code takes named tuples)."""
+
+    chain: ChainConstants
+    arm: ArmLengths
+    rule: ReachRule
+    d_o22: Array
+    k_o22: Array
 
 
 class FeedbackLinearization:
@@ -24,9 +38,14 @@ class FeedbackLinearization:
     def __init__(
         self, robot: RobotParams, beam: BeamParams, resolution: RedundancyResolution
     ) -> None:
-        self.chain = robot_chain(robot, beam)
-        self.object = HangingBeam(beam)
-        self.resolution = resolution
+        carried = HangingBeam(beam)
+        self.model = NominalModel(
+            chain=robot_chain(robot, beam).constants,
+            arm=resolution.kinematics.lengths,
+            rule=resolution.rule,
+            d_o22=carried.d_o22,
+            k_o22=carried.k_o22,
+        )
 
     def generalized_forces(
         self,
@@ -37,32 +56,137 @@ class FeedbackLinearization:
         swing: Array,
         swing_rate: Array,
     ) -> Array:
-        """Return T_r = (f_b, α_b, τ1, τ2), shape (..., 4) in N and N·m.
+        """Return T_r = (f_b, α_b, τ1, τ2), shape (n, 4) in N and N·m.
 
         Args:
-            w: task-space acceleration, (..., 3) m/s², base frame.
-            joints: q_a, (..., 2) rad.
-            joint_rates: q̇_a, (..., 2) rad/s.
-            base_velocity: (u1, u2), (..., 2) m/s, rad/s.
-            swing: φ, (..., N) rad.
-            swing_rate: φ̇, (..., N) rad/s.
+            w: task-space acceleration, (n, 3) m/s², base frame.
+            joints: q_a, (n, 2) rad.
+            joint_rates: q̇_a, (n, 2) rad/s.
+            base_velocity: (u1, u2), (n, 2) m/s, rad/s.
+            swing: φ, (n, N) rad.
+            swing_rate: φ̇, (n, N) rad/s.
         """
-        pitch, pitch_rate = joints @ JOINT_TO_PITCH.T, joint_rates @ JOINT_TO_PITCH.T
-        alpha = np.concatenate((pitch, hanging_pitch(swing)), axis=-1)
-        velocity = np.concatenate((base_velocity, pitch_rate, swing_rate), axis=-1)
-        terms = self.chain.terms(alpha, velocity[..., 2:])
-        inertia = self.chain.mass_matrix(alpha, terms)
-        bias = self.chain.bias(alpha, velocity, terms)
-        actuated = self.resolution.accelerations(w, pitch, pitch_rate, base_velocity)
-        passive_torque = (
-            bias[..., 4:]
-            + np.einsum("jk,...k->...j", self.object.d_o22, swing_rate)
-            + np.einsum("jk,...k->...j", self.object.k_o22, swing)
-            + np.einsum("...jk,...k->...j", inertia[..., 4:, :4], actuated)
+        forces = np.empty((len(w), 4))
+        _generalized_forces(
+            self.model,
+            np.ascontiguousarray(w),
+            np.ascontiguousarray(joints),
+            np.ascontiguousarray(joint_rates),
+            np.ascontiguousarray(base_velocity),
+            np.ascontiguousarray(swing),
+            np.ascontiguousarray(swing_rate),
+            forces,
         )
-        free = -np.linalg.solve(inertia[..., 4:, 4:], passive_torque[..., None])[..., 0]
-        accelerations = np.concatenate((actuated, free), axis=-1)
-        forces = np.einsum("...jk,...k->...j", inertia[..., :4, :], accelerations) + bias[..., :4]
-        # from forces conjugate to α̇ to torques conjugate to q̇_a
-        forces[..., 2:] = forces[..., 2:] @ JOINT_TO_PITCH
         return forces
+
+
+@compiled
+def generalized_forces_at(
+    model: NominalModel,
+    w: Array,
+    joints: Array,
+    joint_rates: Array,
+    base_velocity: Array,
+    swing: Array,
+    swing_rate: Array,
+    forces: Array,
+) -> None:
+    """Write T_r for one state into ``forces``, (4,); arguments as above without the n."""
+    links = 2 + len(swing)
+    alpha, cosine, sine = np.empty(links), np.empty(links), np.empty(links)
+    velocity, M, h = np.empty(2 + links), np.empty((2 + links, 2 + links)), np.empty(2 + links)
+    alpha[0], alpha[1] = joints[0], joints[0] + joints[1]
+    velocity[0], velocity[1] = base_velocity[0], base_velocity[1]
+    velocity[2], velocity[3] = joint_rates[0], joint_rates[0] + joint_rates[1]
+    for j in range(len(swing)):
+        alpha[2 + j], velocity[4 + j] = hanging_pitch(swing[j]), swing_rate[j]
+    for j in range(links):
+        cosine[j], sine[j] = cos(alpha[j]), sin(alpha[j])
+    mass_matrix_at(model.chain, cosine, sine, M)
+    velocity_bias_at(model.chain, cosine, sine, velocity, h)
+    _add_position_forces(model, cosine, swing, swing_rate, h)
+    _inverse_dynamics(model, w, alpha, velocity, M, h, forces)
+
+
+@compiled
+def _generalized_forces(
+    model: NominalModel,
+    w: Array,
+    joints: Array,
+    joint_rates: Array,
+    base_velocity: Array,
+    swing: Array,
+    swing_rate: Array,
+    forces: Array,
+) -> None:
+    for i in range(len(w)):
+        generalized_forces_at(
+            model,
+            w[i],
+            joints[i],
+            joint_rates[i],
+            base_velocity[i],
+            swing[i],
+            swing_rate[i],
+            forces[i],
+        )
+
+
+@compiled
+def _add_position_forces(
+    model: NominalModel, cosine: Array, swing: Array, swing_rate: Array, h: Array
+) -> None:
+    """Complete h of Eq. (7): gravity, the beam's dampers and springs."""
+    for j in range(len(cosine)):
+        h[2 + j] += GRAVITY_M_S2 * model.chain.first_moments[j] * cosine[j]
+    for j in range(len(swing)):
+        for k in range(len(swing)):
+            h[4 + j] += model.d_o22[j, k] * swing_rate[k] + model.k_o22[j, k] * swing[k]
+
+
+@compiled
+def _inverse_dynamics(
+    model: NominalModel,
+    w: Array,
+    alpha: Array,
+    velocity: Array,
+    M: Array,
+    h: Array,
+    forces: Array,
+) -> None:
+    """Write the T_r that gives the grasp the acceleration w; the beam moves as it must.
+
+    Overwrites the beam's part of M and h.
+    """
+    actuated = shared_acceleration(model.arm, model.rule, w, alpha[:2], velocity[2:4], velocity[:2])
+    for j in range(4, len(h)):
+        h[j] = -h[j]
+        for k in range(4):
+            h[j] -= M[j, k] * actuated[k]
+    _solve_positive_definite(M[4:, 4:], h[4:])
+    for j in range(4):
+        forces[j] = h[j]
+        for k in range(4):
+            forces[j] += M[j, k] * actuated[k]
+        for k in range(4, len(h)):
+            forces[j] += M[j, k] * h[k]
+    # from forces conjugate to α̇ to torques conjugate to q̇_a
+    forces[2] += forces[3]
+
+
+@compiled
+def _solve_positive_definite(A: Array, b: Array) -> None:
+    """Turn b (k,) into A⁻¹ b by elimination, A (k, k) into its triangular factor.
+
+    Positive definite matrices need no pivots; LAPACK's solver costs more than all the rest here.
+    """
+    for j in range(len(b)):
+        for i in range(j + 1, len(b)):
+            factor = A[i, j] / A[j, j]
+            b[i] -= factor * b[j]
+            for k in range(j, len(b)):
+                A[i, k] -= factor * A[j, k]
+    for j in range(len(b) - 1, -1, -1):
+        for k in range(j + 1, len(b)):
+            b[j] -= A[j, k] * b[k]
+        b[j] /= A[j, j]

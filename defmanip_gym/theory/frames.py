@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.theory.chain import Array
 
 
@@ -14,6 +15,12 @@ def world_to_base(vector_w: Array, heading: Array) -> Array:
 
 def base_to_world(vector_b: Array, heading: Array) -> Array:
     """Return a (..., 3) vector of the base frame in world coordinates."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    x, y = vector_b[..., 0], vector_b[..., 1]
-    return np.stack((cos * x - sin * y, sin * x + cos * y, vector_b[..., 2]), axis=-1)
+    x, y = turned(vector_b[..., 0], vector_b[..., 1], heading)
+    return np.stack((x, y, vector_b[..., 2]), axis=-1)
+
+
+@compilable
+def turned(x: Numbers, y: Numbers, angle: Numbers) -> tuple[Numbers, Numbers]:
+    """Return the components (...) of a plane vector turned by ``angle`` (...) rad."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y

@@ -84,8 +84,8 @@ class _PeakIteration:
     ) -> None:
         chain, nominal = HangingBeam(beam).chain, linearize(beam)
         count, rows = middle.count, _Rows(middle)
-        self.moments = chain.first_moments
-        self.coupling = chain.geometry.T @ (chain.masses[:, None] * chain.geometry)
+        self.moments = chain.constants.first_moments
+        self.coupling = chain.constants.second_moments.copy()
         np.fill_diagonal(self.coupling, 0.0)
         self.gain = rows.of(-nominal.m_o12[0][:, None])[:, 0]
         self.torque_gains = rows.of(np.eye(count))

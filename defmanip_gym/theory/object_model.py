@@ -10,12 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
 from defmanip_gym.theory.chain import Array, YawingChain, beam_links
 
 
-def hanging_pitch(swing: Array) -> Array:
+@compilable
+def hanging_pitch(swing: Numbers) -> Numbers:
     """Return the pitch α = φ − π/2 of a hanging segment at swing φ, rad."""
     return swing - np.pi / 2
 
@@ -76,26 +78,27 @@ class HangingBeam:
             swing_rate: φ̇, (..., N) rad/s.
             yaw_rate: u2, (...) rad/s.
         """
-        chain, alpha = self.chain, hanging_pitch(swing)
-        terms = chain.terms(alpha, swing_rate)
-        masses, u2 = chain.masses, np.asarray(yaw_rate)
-        forward = np.einsum("i,...ik->...k", masses, terms.jacobian_r)
-        upward = np.einsum("i,...ik->...k", masses, terms.jacobian_z)
+        chain, alpha, u2 = self.chain, hanging_pitch(swing), np.asarray(yaw_rate)
+        moments, total = chain.constants.first_moments, chain.constants.total_mass
+        velocity = np.concatenate(
+            (np.zeros((*u2.shape, 1)), u2[..., None], np.asarray(swing_rate)), axis=-1
+        )
+        forward, upward = -moments * np.sin(alpha), moments * np.cos(alpha)
+        bias = chain.velocity_bias(alpha, velocity)
         c_o1 = np.stack(
             (
-                (masses * (terms.r_bias - terms.r * u2[..., None] ** 2)).sum(-1),
-                2 * u2 * (masses * terms.r_dot).sum(-1),
-                (masses * terms.z_bias).sum(-1),
+                bias[..., 0],
+                2 * u2 * (forward * swing_rate).sum(-1),
+                (forward * swing_rate**2).sum(-1),
             ),
             axis=-1,
         )
-        total = masses.sum()
         return ObjectPartition(
             m_o11=total * np.eye(3),
             m_o12=np.stack((forward, np.zeros_like(forward), upward), axis=-2),
-            m_o22=chain.pitch_inertia(terms),
+            m_o22=chain.mass_matrix(alpha)[..., 2:, 2:],
             c_o1=c_o1,
-            c_o2=chain.pitch_bias(alpha, terms, u2),
+            c_o2=bias[..., 2:],
             t_o1=np.array([0.0, 0.0, total * GRAVITY_M_S2]),
             t_o2=chain.gravity_torque(alpha),
         )

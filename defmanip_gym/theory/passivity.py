@@ -32,7 +32,7 @@ def storage(
         kinetic = kinetic + _form(partition.m_o12, grasp_velocity, swing_rate)
         kinetic = kinetic + 0.5 * _form(partition.m_o11, grasp_velocity, grasp_velocity)
     elastic = 0.5 * _form(model.k_o22, swing, swing)
-    raised = (model.chain.first_moments * (1 - np.cos(swing))).sum(-1)
+    raised = (model.chain.constants.first_moments * (1 - np.cos(swing))).sum(-1)
     return kinetic + elastic + GRAVITY_M_S2 * raised
 
 
@@ -46,8 +46,7 @@ def coriolis_matrix(model: HangingBeam, swing: Array, swing_rate: Array) -> Arra
 
     This choice makes ṁ_o22 − 2 C_o22 skew-symmetric, as the proof of Lemma III.1 needs.
     """
-    chain, alpha = model.chain, hanging_pitch(swing)
-    coupling = chain.geometry.T @ (chain.masses[:, None] * chain.geometry)
+    coupling, alpha = model.chain.constants.second_moments, hanging_pitch(swing)
     turned = alpha[..., :, None] - alpha[..., None, :]
     return coupling * np.sin(turned) * swing_rate[..., None, :]
 

@@ -8,11 +8,20 @@ makes up for the arm's horizontal motion, so the grasp acceleration is exactly w
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.params import RobotParams
 from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.robot_model import ArmKinematics
+from defmanip_gym.theory.robot_model import (
+    ArmKinematics,
+    ArmLengths,
+    reach_and_height,
+    reach_and_height_bias,
+    reach_and_height_slopes,
+)
 from defmanip_gym.validation import require_positive
 
 
@@ -28,6 +37,43 @@ def task_planes(base_jacobian: Array) -> tuple[Array, Array]:
     """
     S_b = base_jacobian @ np.linalg.pinv(base_jacobian)
     return S_b, np.eye(base_jacobian.shape[-2]) - S_b
+
+
+class ReachRule(NamedTuple):
+    """The self-motion: ρ̈ = −k3 (ρ̇ + k (ρ − ρ*))."""
+
+    goal_reach_m: float
+    k: float
+    k3: float
+
+
+@compilable
+def shared_acceleration(
+    arm: ArmLengths,
+    rule: ReachRule,
+    w: Array,
+    pitch: Array,
+    pitch_rate: Array,
+    base_velocity: Array,
+) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    """Return u̇1, u̇2, α̈1, α̈2, (...) each; see ``RedundancyResolution.accelerations``."""
+    u1, u2 = base_velocity[..., 0], base_velocity[..., 1]
+    upper, fore = pitch[..., 0], pitch[..., 1]
+    upper_rate, fore_rate = pitch_rate[..., 0], pitch_rate[..., 1]
+    reach = reach_and_height(arm, upper, fore)[0]
+    rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
+    reach_rate = rho_1 * upper_rate + rho_2 * fore_rate
+    reach_acceleration = -rule.k3 * (reach_rate + rule.k * (reach - rule.goal_reach_m))
+    reach_bias, height_bias = reach_and_height_bias(arm, upper, fore, upper_rate, fore_rate)
+    # the arm realizes ρ̈ and w_z, the base the rest of w
+    along, up = reach_acceleration - reach_bias, w[..., 2] - height_bias
+    determinant = rho_1 * z_2 - rho_2 * z_1
+    return (
+        w[..., 0] - reach_acceleration + reach * u2**2,
+        (w[..., 1] - 2 * reach_rate * u2 - u1 * u2) / reach,
+        (z_2 * along - rho_2 * up) / determinant,
+        (rho_1 * up - z_1 * along) / determinant,
+    )
 
 
 class RedundancyResolution:
@@ -47,7 +93,7 @@ class RedundancyResolution:
         require_positive("k", k, "1/s")
         require_positive("k3", k3, "1/s")
         self.kinematics = ArmKinematics(robot)
-        self.goal_reach_m, self.k, self.k3 = goal_reach_m, k, k3
+        self.rule = ReachRule(float(goal_reach_m), float(k), float(k3))
 
     def accelerations(
         self, w: Array, pitch: Array, pitch_rate: Array, base_velocity: Array
@@ -60,23 +106,9 @@ class RedundancyResolution:
             pitch_rate: α̇, (..., 2) rad/s.
             base_velocity: (u1, u2), (..., 2).
         """
-        u1, u2 = base_velocity[..., 0], base_velocity[..., 1]
-        reach = self.kinematics.reach_and_height(pitch)[..., 0]
-        jacobian = self.kinematics.jacobian(pitch)
-        reach_rate = (jacobian[..., 0, :] * pitch_rate).sum(-1)
-        reach_acceleration = -self.k3 * (reach_rate + self.k * (reach - self.goal_reach_m))
-        desired = np.stack((reach_acceleration, w[..., 2]), axis=-1)
-        desired = desired - self.kinematics.bias_acceleration(pitch, pitch_rate)
-        determinant = (
-            jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        return np.stack(
+            shared_acceleration(
+                self.kinematics.lengths, self.rule, w, pitch, pitch_rate, base_velocity
+            ),
+            axis=-1,
         )
-        accelerations = np.empty((*reach.shape, 4))
-        accelerations[..., 0] = w[..., 0] - reach_acceleration + reach * u2**2
-        accelerations[..., 1] = (w[..., 1] - 2 * reach_rate * u2 - u1 * u2) / reach
-        accelerations[..., 2] = (
-            jacobian[..., 1, 1] * desired[..., 0] - jacobian[..., 0, 1] * desired[..., 1]
-        ) / determinant
-        accelerations[..., 3] = (
-            jacobian[..., 0, 0] * desired[..., 1] - jacobian[..., 1, 0] * desired[..., 0]
-        ) / determinant
-        return accelerations

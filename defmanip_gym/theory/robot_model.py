@@ -6,8 +6,11 @@ Quasi-velocities u = (u1, u2, q̇1, q̇2).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.theory.chain import Array, YawingChain, arm_links, beam_links
 
@@ -18,6 +21,54 @@ PITCH_TO_JOINT = np.linalg.inv(JOINT_TO_PITCH)
 QUASI_TO_PITCH = np.block([[np.eye(2), np.zeros((2, 2))], [np.zeros((2, 2)), JOINT_TO_PITCH]])
 
 
+class ArmLengths(NamedTuple):
+    """What the arm's kinematics depend on (compiled code takes named tuples)."""
+
+    upper_arm_m: float
+    forearm_m: float
+    shoulder_height_m: float
+
+    @classmethod
+    def of(cls, robot: RobotParams) -> ArmLengths:
+        """Return the lengths of a robot's arm."""
+        return cls(
+            float(robot.upper_arm.length_m),
+            float(robot.forearm.length_m),
+            float(robot.shoulder_height_m),
+        )
+
+
+@compilable
+def reach_and_height(arm: ArmLengths, upper: Numbers, fore: Numbers) -> tuple[Numbers, Numbers]:
+    """Return ρ and z of the grasp, (...) m each, for the pitches α1, α2 (...) rad."""
+    reach = arm.upper_arm_m * np.cos(upper) + arm.forearm_m * np.cos(fore)
+    height = arm.upper_arm_m * np.sin(upper) + arm.forearm_m * np.sin(fore)
+    return reach, height + arm.shoulder_height_m
+
+
+@compilable
+def reach_and_height_slopes(
+    arm: ArmLengths, upper: Numbers, fore: Numbers
+) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    """Return ∂ρ/∂α1, ∂ρ/∂α2, ∂z/∂α1, ∂z/∂α2, (...) m/rad each."""
+    return (
+        -arm.upper_arm_m * np.sin(upper),
+        -arm.forearm_m * np.sin(fore),
+        arm.upper_arm_m * np.cos(upper),
+        arm.forearm_m * np.cos(fore),
+    )
+
+
+@compilable
+def reach_and_height_bias(
+    arm: ArmLengths, upper: Numbers, fore: Numbers, upper_rate: Numbers, fore_rate: Numbers
+) -> tuple[Numbers, Numbers]:
+    """Return ρ̈ and z̈ at α̈ = 0, (...) m/s² each."""
+    rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
+    squared_1, squared_2 = upper_rate**2, fore_rate**2
+    return -z_1 * squared_1 - z_2 * squared_2, rho_1 * squared_1 + rho_2 * squared_2
+
+
 class ArmKinematics:
     """Where the grasp is, and how it moves: Eq. (1) in the base frame.
 
@@ -26,32 +77,21 @@ class ArmKinematics:
     """
 
     def __init__(self, robot: RobotParams) -> None:
-        self.lengths = np.array([robot.upper_arm.length_m, robot.forearm.length_m])
-        self.shoulder_height = robot.shoulder_height_m
+        self.lengths = ArmLengths.of(robot)
 
     def reach_and_height(self, pitch: Array) -> Array:
         """Return (ρ, z), shape (..., 2) in m, of the grasp for pitches (..., 2) in rad."""
-        return np.stack(
-            (
-                (self.lengths * np.cos(pitch)).sum(-1),
-                (self.lengths * np.sin(pitch)).sum(-1) + self.shoulder_height,
-            ),
-            axis=-1,
-        )
+        return np.stack(reach_and_height(self.lengths, *_each(pitch)), axis=-1)
 
     def jacobian(self, pitch: Array) -> Array:
         """Return d(ρ, z)/dα, shape (..., 2, 2), in m/rad."""
-        return np.stack((-self.lengths * np.sin(pitch), self.lengths * np.cos(pitch)), axis=-2)
+        slopes = np.stack(reach_and_height_slopes(self.lengths, *_each(pitch)), axis=-1)
+        return slopes.reshape(*slopes.shape[:-1], 2, 2)
 
     def bias_acceleration(self, pitch: Array, pitch_rate: Array) -> Array:
         """Return (ρ̈, z̈) at α̈ = 0, shape (..., 2) in m/s²."""
-        squared = pitch_rate**2
-        return -np.stack(
-            (
-                (self.lengths * np.cos(pitch) * squared).sum(-1),
-                (self.lengths * np.sin(pitch) * squared).sum(-1),
-            ),
-            axis=-1,
+        return np.stack(
+            reach_and_height_bias(self.lengths, *_each(pitch), *_each(pitch_rate)), axis=-1
         )
 
     def task_jacobian(self, pitch: Array) -> Array:
@@ -81,6 +121,10 @@ class ArmKinematics:
         )
 
 
+def _each(pair: Array) -> tuple[Array, Array]:
+    return pair[..., 0], pair[..., 1]
+
+
 def robot_chain(robot: RobotParams, beam: BeamParams | None = None) -> YawingChain:
     """Return the chain of the robot alone, Eq. (2), or carrying the beam, Eq. (7)."""
     links = arm_links(robot) + (beam_links(beam) if beam is not None else ())
@@ -106,7 +150,6 @@ def robot_dynamics(
         base_velocity: (u1, u2), (..., 2) m/s, rad/s.
     """
     chain = robot_chain(robot)
-    terms = chain.terms(pitch, pitch_rate)
     velocity = np.concatenate((base_velocity, pitch_rate), axis=-1)
-    inertia = QUASI_TO_PITCH.T @ chain.mass_matrix(pitch, terms) @ QUASI_TO_PITCH
-    return inertia, chain.bias(pitch, velocity, terms) @ QUASI_TO_PITCH
+    inertia = QUASI_TO_PITCH.T @ chain.mass_matrix(pitch) @ QUASI_TO_PITCH
+    return inertia, chain.bias(pitch, velocity) @ QUASI_TO_PITCH

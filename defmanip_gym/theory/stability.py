@@ -68,7 +68,7 @@ class SampledLoop:
         rest = np.zeros(count)
         model = HangingBeam(self.beam)
         partition = model.partition(rest, rest, np.zeros(()))
-        gravity = GRAVITY_M_S2 * np.diag(model.chain.first_moments)
+        gravity = GRAVITY_M_S2 * np.diag(model.chain.constants.first_moments)
         stiffness, damping = model.k_o22 + gravity, model.d_o22
         coupling = partition.m_o12[0]
         feedthrough = np.linalg.solve(partition.m_o22, coupling)  # m_o22⁻¹ m_o12ᵀ, forward

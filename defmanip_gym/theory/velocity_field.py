@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.validation import require_positive
 
@@ -41,13 +42,14 @@ def dipole_direction(p: Array) -> Array:
     return np.where((s > _TINY)[..., None], direction, np.stack((ahead, np.zeros_like(x)), axis=-1))
 
 
-def streamline_heading(p: Array) -> Array:
+@compilable
+def streamline_heading(x: Numbers, y: Numbers) -> Numbers:
     """Return the heading 2 atan2(p_y, p_x) of a robot driving along the dipole at p, (...) rad.
 
     Forwards behind the goal (p_x < 0), backwards ahead of it; in (−2π, 2π], without the jump by π
     that the direction of motion makes at p_x = 0.
     """
-    return 2 * np.arctan2(p[..., 1], p[..., 0])
+    return 2 * np.arctan2(y, x)
 
 
 class VelocityField(Protocol):

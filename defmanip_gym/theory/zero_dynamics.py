@@ -95,7 +95,7 @@ def equilibrium(beam: BeamParams) -> Array:
 def linearize(beam: BeamParams) -> LinearizedObject:
     """Return the linearization (16) of a beam's zero dynamics about hanging at rest."""
     model = HangingBeam(beam)
-    chain = model.chain
+    chain = model.chain.constants
     rest = np.zeros(model.count)
     partition = model.partition(rest, rest, np.zeros(()))
     moments = np.diag(chain.first_moments)
@@ -108,8 +108,7 @@ def linearize(beam: BeamParams) -> LinearizedObject:
         gravity_stiffness=GRAVITY_M_S2 * moments,
         horizontal_stiffness=np.zeros((2, model.count, model.count)),
         vertical_stiffness=moments,
-        centrifugal_stiffness=chain.geometry.T @ (chain.masses[:, None] * chain.geometry)
-        + np.diag(chain.transverse - chain.axial),
+        centrifugal_stiffness=chain.second_moments + np.diag(chain.transverse - chain.axial),
         equilibrium=equilibrium(beam),
         is_excited_by_yaw=False,
         coordinates=tuple(f"segment {index + 1}" for index in range(model.count)),

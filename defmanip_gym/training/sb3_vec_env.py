@@ -9,80 +9,129 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvStepReturn
 
-from defmanip_gym.errors import ParameterError
+from defmanip_gym.errors import ParameterError, StartError
 
 Array = NDArray[np.float64]
-
-_EPISODE_KEYS = ("is_success", "cost", "constraint_margin")
+Ids = NDArray[np.intp]
 
 
 class Sb3VecEnv(VecEnv):
-    """Presents a Gymnasium ``VectorEnv`` in SAME_STEP mode to SB3.
+    """Presents a batched environment in SAME_STEP mode to SB3, without a loop over its episodes.
 
-    Per-episode info dicts are built for ended episodes only: SB3 reads ``terminal_observation``,
-    ``TimeLimit.truncated`` and ``episode`` from them, and nothing from the others.
+    The info dict of an episode that ends holds what SB3 reads (``terminal_observation``,
+    ``TimeLimit.truncated``, and ``episode`` with return, length and cost) and the environment's
+    own info of its last step; those of the others are empty. ``step_info`` holds the info of all
+    episodes as arrays. Episode statistics are kept here: no ``VecMonitor`` is needed.
 
     Args:
-        env: the batched environment.
+        env: the package's batched environment, with its vector wrappers if any.
 
     Raises:
         ParameterError: the environment resets in another way.
+
+    Example:
+        >>> import gymnasium
+        >>> from stable_baselines3 import PPO
+        >>> from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
+        >>> env = gymnasium.make_vec("defmanip_gym:DeformTransport-v0", num_envs=64)
+        >>> model = PPO("MlpPolicy", Sb3VecEnv(env), n_steps=32, batch_size=1024)
+        >>> model.learn(1_000_000)  # doctest: +SKIP
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
-        if env.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
+        mode = env.metadata.get("autoreset_mode")
+        if mode is not AutoresetMode.SAME_STEP:
             raise ParameterError(
                 "autoreset_mode",
-                env.metadata["autoreset_mode"],
+                mode,
                 "AutoresetMode.SAME_STEP",
                 "SB3 expects ended episodes to be reset within the step.",
             )
         self.env = env
-        self._actions: Array
+        self.spec = env.spec
+        self.step_info: dict[str, Any] = {}
+        self._actions: NDArray[Any]
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
         self._costs = np.zeros(env.num_envs)
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        # as the video recorder reads it
+        self.metadata |= {"render_fps": env.metadata.get("render_fps", 30)}
 
     def reset(self) -> Array:
-        """Start all episodes anew with the seeds of ``seed``, if any."""
+        """Start all episodes anew, with what ``seed`` and ``set_options`` asked for, if anything.
+
+        Raises:
+            StartError: options that the environment cannot take.
+        """
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
-        observation, _ = self.env.reset(seed=seeds)  # type: ignore[arg-type]
+        options = _batch_options(self._options)
+        observation, info = self.env.reset(seed=seeds, options=options)  # type: ignore[arg-type]
         self._reset_seeds()
         self._reset_options()
         for tally in (self._returns, self._lengths, self._costs):
             tally[:] = 0
+        self.step_info = info
+        self.reset_infos = _rows(info, np.arange(self.num_envs))
         return observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions for ``step_wait``."""
-        self._actions = np.asarray(actions, dtype=np.float64)
+        self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
         """Step the batch."""
         observation, reward, terminated, truncated, info = self.env.step(self._actions)
         ended = terminated | truncated
+        # new ones: wrappers may write into any of them, and keep them (60 ns each)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        self.step_info = info
         self._returns += reward
         self._lengths += 1
-        last = info.get("final_info", info)
-        self._costs += last["cost"]
-        for i in np.flatnonzero(ended):
-            infos[i] = {
-                "terminal_observation": info["final_obs"][i],
-                "TimeLimit.truncated": bool(truncated[i]),
-                "episode": {
-                    "r": float(self._returns[i]),
-                    "l": int(self._lengths[i]),
-                    "cost": float(self._costs[i]),
-                },
-                **{key: last[key][i].item() for key in _EPISODE_KEYS},
-            }
-        for tally in (self._returns, self._lengths, self._costs):
-            tally[ended] = 0
+        ids = np.flatnonzero(ended)
+        if len(ids):
+            last = info["final_info"]
+            self._costs += np.where(ended, last["cost"], info["cost"])
+            for i, ending in zip(
+                ids, self._endings(ids, last, info, truncated & ~terminated), strict=True
+            ):
+                infos[i] = ending
+            for tally in (self._returns, self._lengths, self._costs):
+                tally[ids] = 0
+        else:
+            self._costs += info["cost"]
+        # SB3 adds the value of truncated episodes to the rewards in place: a copy
         return observation, reward.astype(np.float32), ended, infos
+
+    def _endings(
+        self, ids: Ids, last: dict[str, Any], info: dict[str, Any], truncated: NDArray[np.bool_]
+    ) -> list[dict[str, Any]]:
+        """Return the info dicts of the episodes that ended, and note the infos of their successors.
+
+        Args:
+            ids: the episodes, (k,).
+            last: their info before the reset.
+            info: their info after it.
+            truncated: which were truncated, (n,).
+        """
+        endings = _rows(last, ids)
+        columns = (
+            info["final_obs"][ids],
+            truncated[ids].tolist(),
+            self._returns[ids].tolist(),
+            self._lengths[ids].tolist(),
+            self._costs[ids].tolist(),
+        )
+        for ending, observation, cut, total, length, cost in zip(endings, *columns, strict=True):
+            ending["terminal_observation"] = observation
+            ending["TimeLimit.truncated"] = cut
+            ending["episode"] = {"r": total, "l": length, "cost": cost}
+        for i, first in zip(ids, _rows(info, ids), strict=True):
+            self.reset_infos[i] = first
+        return endings
 
     def close(self) -> None:
         """Close the batch."""
@@ -90,7 +139,8 @@ class Sb3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return the batch's attribute once for each index."""
-        return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
+        value = self._attribute(attr_name)
+        return [value for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Refuse: the episodes of a batch share their attributes."""
@@ -100,19 +150,58 @@ class Sb3VecEnv(VecEnv):
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
         """Call the batch's method and return its result once for each index."""
-        result = getattr(self.env, method_name)(*args, **kwargs)
+        result = self._attribute(method_name)(*args, **kwargs)
         return [result for _ in self._get_indices(indices)]
 
-    def env_is_wrapped(
-        self,
-        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
-        indices: VecEnvIndices = None,
-    ) -> list[bool]:
-        """Whether episodes are wrapped; true of ``Monitor``, whose statistics are kept here."""
-        from stable_baselines3.common.monitor import Monitor
+    def _attribute(self, name: str) -> Any:
+        layer = self.env  # Gymnasium's vector wrappers do not hand attributes through
+        while not hasattr(layer, name) and isinstance(layer, gymnasium.vector.VectorWrapper):
+            layer = layer.env
+        return getattr(layer, name)
 
-        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
+        """Whether the batch is in such a wrapper; true of ``Monitor``, whose work is done here."""
+        layer, wrapped = self.env, wrapper_class is Monitor
+        while isinstance(layer, gymnasium.vector.VectorWrapper):
+            wrapped |= isinstance(layer, wrapper_class)
+            layer = layer.env
+        return [wrapped for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """Return an image of each episode."""
         return self.env.render() or ()  # type: ignore[return-value]
+
+
+def _rows(info: dict[str, Any], ids: Ids) -> list[dict[str, Any]]:
+    """Return the info dicts of single episodes, as plain numbers, from the arrays of a batch."""
+    names = [
+        name
+        for name, value in info.items()
+        if isinstance(value, np.ndarray) and value.ndim == 1 and not name.startswith("_")
+    ]
+    columns = [info[name][ids].tolist() for name in names]
+    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def _batch_options(options: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """Return one dict of reset options for the batch from SB3's one for each episode.
+
+    Raises:
+        StartError: they differ in more than the numbers of their starts.
+    """
+    first = options[0]
+    if all(one is first for one in options):  # a single dict was given
+        return first or None
+    if not any(options):
+        return None
+    starts = [one.get("start", "sampled") if set(one) <= {"start"} else None for one in options]
+    if isinstance(starts[0], str) and all(isinstance(s, str) and s == starts[0] for s in starts):
+        return {"start": starts[0]}
+    if any(start is None or isinstance(start, str) for start in starts):
+        raise StartError(
+            "options",
+            options,
+            "one dict for all episodes, or a list with six numbers as every 'start'",
+            "A batch takes named starts for all of its episodes or for none.",
+        )
+    return {"start": np.array(starts, dtype=np.float64)}

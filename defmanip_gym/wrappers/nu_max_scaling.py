@@ -89,6 +89,9 @@ class ActionScaling:
                 "Certify with the environment's sigma_rad.",
             )
         self._config, self._certificate = config, certificate
+        # what a certificate covers is an interval of dampings, so the ends of a range tell
+        beams = config.beam_ranges.extremes(config.beam)
+        self._covers = all(certificate.covers(beam) for beam in beams)
         self._layout = ObservationLayout(config.beam.segment_count)
         self._kinematics = ArmKinematics(config.robot)
         self._memory: _LastPeriod
@@ -99,7 +102,8 @@ class ActionScaling:
     def begin(self, observation: Array, started: BoolArray) -> BoolArray:
         """Forget the past of episodes that start; return whether the certificate covers these.
 
-        It does when it covers the true beam and the episode starts within its initial swing.
+        It does when it covers every beam that an episode may carry and the episode starts within
+        its initial swing.
 
         Args:
             observation: first observations, (n, size); rows that do not start are not looked at.
@@ -110,7 +114,7 @@ class ActionScaling:
         self._memory.known[started] = False
         swing = np.abs(self._layout.part(observation, "swing")).max(axis=1)
         limit = self._certificate.conditions.initial_swing_rad + _ROUNDING
-        return np.asarray(self._certificate.covers(self._config.beam) & (swing <= limit))
+        return np.asarray(self._covers & (swing <= limit))
 
     def scale(self, actions: Array, observation: Array) -> tuple[Array, Array]:
         """Return certified actions (n, 3) and by how much w changed, (n,) m/s².

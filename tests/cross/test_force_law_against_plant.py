@@ -49,10 +49,9 @@ def test_measured_force_is_the_linearizing_force_of_the_measured_motion(make_pla
     model, u2 = HangingBeam(beam), state.base_velocity[:, 1]
     expected = model.linearizing_force(state.swing, state.swing_rate, u2, acceleration)
     # (10) knows z1 only; a swung-out beam that the base turns needs this much more to the left
-    moment = (model.chain.masses * np.cumsum(np.sin(state.swing), axis=1)).sum(axis=1)
-    moment -= 0.5 * (model.chain.masses * np.sin(state.swing)).sum(axis=1)
+    moment = np.sin(state.swing) @ model.chain.constants.first_moments
     turning = (after.base_velocity[:, 1] - u2) / PERIOD_S
-    expected[:, 1] += moment * beam.segment_length_m * turning
+    expected[:, 1] += moment * turning
     assert np.abs(acceleration[0, 0]) > 0.5
     np.testing.assert_allclose(state.grasp_force_b, expected, atol=0.04)
 

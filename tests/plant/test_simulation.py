@@ -28,7 +28,7 @@ def forces_for(plant, beam, w):
 
 def energy(plant):
     data = mujoco.MjData(plant.model)
-    plant.materialize(0, data)
+    plant.materialize(0, plant.model, data)
     mujoco.mj_energyPos(plant.model, data)
     mujoco.mj_energyVel(plant.model, data)
     return data.energy.sum()
@@ -108,8 +108,24 @@ def test_damping_takes_the_energy_that_it_should(make_plant):
     assert np.diff(energies).max() < 2e-3
 
 
-def test_diverged_simulation_is_reported_and_the_others_go_on(make_plant, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_grasp_force_is_that_of_this_instant(make_plant, substeps):
+    plant = make_plant(BeamParams(segment_count=2), swing=0.2)
+    lags, errors = [], []
+    for k in range(40):
+        plant.apply(np.array([[60 * math.cos(k), 8.0, 50 * math.sin(k), 25.0]]))
+        plant.step(substeps)
+        sensed, force = plant._readings[:, -1].copy(), plant._grasp_force_s.copy()
+        plant._batch.forward()
+        lags.append(sensed - plant._sensed_force)
+        errors.append(force - plant._sensed_force)
+    assert np.square(errors).mean() < 0.2**2 * np.square(lags).mean()
+
+
+def test_diverged_simulation_is_reported_and_the_others_go_on(
+    make_plant, tmp_path, monkeypatch, capfd
+):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo would write its warnings to a file
     healthy, sick = make_plant(count=3, swing=0.2), make_plant(count=3, swing=0.2)
     sick._velocity[1, 3] = 1e20
     np.testing.assert_array_equal(sick.step(4), [False, True, False])
@@ -120,6 +136,8 @@ def test_diverged_simulation_is_reported_and_the_others_go_on(make_plant, tmp_pa
     sick.place(np.array([1]), np.zeros((1, 3)), np.array([[np.pi / 2, -np.pi / 2]]), [[0.2]])
     assert not sick.step(4).any()
     np.testing.assert_array_equal(sick.read().swing[1], healthy.read().swing[1])
+    assert not list(tmp_path.iterdir())
+    assert capfd.readouterr().err == ""
 
 
 def trajectory(plant):

@@ -57,7 +57,7 @@ def test_reach_settles_at_the_goal_reach(seed):
     reach_acceleration = (jacobian @ acceleration + bias)[0]
     reach, reach_rate = ARM.reach_and_height(pitch)[0], (jacobian @ rate)[0]
     # (s + k)(s + k3) up to the order of k k3: damped towards ρ* from either side
-    expected = -RESOLUTION.k3 * (reach_rate + RESOLUTION.k * (reach - 0.7))
+    expected = -RESOLUTION.rule.k3 * (reach_rate + RESOLUTION.rule.k * (reach - 0.7))
     assert reach_acceleration == pytest.approx(expected, abs=1e-8)
 
 

@@ -87,7 +87,7 @@ def test_printed_potential_has_radial_streamlines_instead():
 
 @given(positions)
 def test_streamline_heading_is_tangent_to_the_streamline(p):
-    heading = streamline_heading(p)
+    heading = streamline_heading(p[..., 0], p[..., 1])
     along = dipole_direction(p) @ [np.cos(heading), np.sin(heading)]
     assert along == pytest.approx(1.0 if p[0] < 0 else -1.0, abs=1e-9)
 

@@ -1,0 +1,175 @@
+"""From actions to generalized forces: what runs between policy and plant in every period."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defmanip_gym.compiled import compiled, machine_code
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import ActionError
+from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.plant.plant_state import PlantState
+from defmanip_gym.theory.control_laws import limit_speed_at
+from defmanip_gym.theory.feedback_linearization import (
+    FeedbackLinearization,
+    NominalModel,
+    generalized_forces_at,
+)
+from defmanip_gym.theory.redundancy import RedundancyResolution
+
+Array = NDArray[np.float64]
+
+
+class LoopConstants(NamedTuple):
+    """What the loop in task mode depends on (compiled code takes named tuples)."""
+
+    model: NominalModel
+    max_acceleration_m_s2: float
+    max_speed_m_s: float
+    period_s: float
+    velocity_column: int
+
+
+class InnerLoop:
+    """Turns actions of n episodes into the generalized forces T_r of Eq. (2).
+
+    Args:
+        config: the environment's definition.
+        num_envs: n.
+    """
+
+    def __init__(self, config: TransportConfig, num_envs: int) -> None:
+        self._mode, task = config.control_mode, config.task
+        self.action_size = 3 if self._mode == "task" else 4
+        self._shape = (num_envs, self.action_size)
+        self._force_limits = np.array(config.robot.force_limits)
+        reach_m, _ = config.goal_reach_and_height_m
+        linearization = FeedbackLinearization(
+            config.believed_robot,
+            config.believed_beam,
+            RedundancyResolution(config.believed_robot, goal_reach_m=reach_m),
+        )
+        layout = ObservationLayout(config.beam.segment_count)
+        self._constants = LoopConstants(
+            model=linearization.model,
+            max_acceleration_m_s2=float(task.max_acceleration_m_s2),
+            max_speed_m_s=float(task.max_speed_m_s),
+            period_s=float(task.control_period_s),
+            velocity_column=layout.slices["grasp_velocity_b"].start,
+        )
+        actions, forces = np.empty(self._shape), np.empty((num_envs, 4))
+        observations = np.empty((num_envs, layout.size))
+        state = PlantState.empty(num_envs, config.beam.segment_count)
+        self._clip = machine_code(_clip, actions)
+        self._hold = machine_code(_hold, self._constants.model, state.joints, state.swing, forces)
+        self._scale = machine_code(_scale, self._force_limits, actions, forces)
+        self._linearize = machine_code(
+            _linearize, self._constants, actions, observations, state, forces
+        )
+
+    def clipped(self, actions: Any) -> Array:
+        """Return the actions, (n, k), clipped to [-1, 1].
+
+        Raises:
+            ActionError: wrong shape or values that are not finite.
+        """
+        try:
+            values = np.array(actions, dtype=np.float64, order="C")
+        except (TypeError, ValueError) as error:
+            raise ActionError(
+                "action", actions, f"numbers of shape {self._shape}", "Pass a NumPy array."
+            ) from error
+        if values.shape != self._shape:
+            raise ActionError(
+                "action shape",
+                values.shape,
+                f"{self._shape} in {self._mode!r} control mode",
+                "Check the environment's action_space.",
+            )
+        if not self._clip(values):
+            raise ActionError(
+                "action",
+                values.tolist() if len(values) == 1 else "an array with NaN or infinity",
+                "finite numbers in [-1, 1]",
+                "Look for a diverged policy or controller.",
+            )
+        return values
+
+    def forces(self, actions: Array, observations: Array, plant: PlantState) -> Array:
+        """Return T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
+
+        Args:
+            actions: clipped, (n, k).
+            observations: the last ones, (n, size); they hold the grasp's velocity.
+            plant: the true state, which the feedback linearization measures without noise.
+        """
+        forces = np.empty((len(actions), 4))
+        if self._mode == "force":
+            self._scale(self._force_limits, actions, forces)
+        else:
+            self._linearize(self._constants, actions, observations, plant, forces)
+        return forces
+
+    def holding_forces(self, joints: Array, swing: Array) -> Array:
+        """Return the T_r, (k, 4), that holds robots at ``joints`` (k, 2) and ``swing`` (k, N)."""
+        forces = np.empty((len(joints), 4))
+        self._hold(self._constants.model, joints, swing, forces)
+        return forces
+
+
+@compiled
+def _hold(model: NominalModel, joints: Array, swing: Array, forces: Array) -> None:
+    still = np.zeros(3 + swing.shape[1])
+    for i in range(len(forces)):
+        generalized_forces_at(
+            model, still[:3], joints[i], still[:2], still[:2], swing[i], still[3:], forces[i]
+        )
+
+
+@compiled
+def _clip(actions: Array) -> bool:
+    """Clip in place; return whether all values were finite."""
+    for i in range(actions.shape[0]):
+        for k in range(actions.shape[1]):
+            if not np.isfinite(actions[i, k]):
+                return False
+            actions[i, k] = min(max(actions[i, k], -1.0), 1.0)
+    return True
+
+
+@compiled
+def _scale(limits: Array, actions: Array, forces: Array) -> None:
+    for i in range(forces.shape[0]):
+        for k in range(4):
+            forces[i, k] = limits[k] * actions[i, k]
+
+
+@compiled
+def _linearize(
+    loop: LoopConstants, actions: Array, observations: Array, plant: PlantState, forces: Array
+) -> None:
+    # the forces act for a whole period: take them where the motion will be half-way through it
+    half = 0.5 * loop.period_s
+    w, joints, swing = np.empty(3), np.empty(2), np.empty(plant.swing.shape[1])
+    for i in range(len(actions)):
+        for k in range(3):
+            w[k] = actions[i, k] * loop.max_acceleration_m_s2
+        velocity = observations[i, loop.velocity_column : loop.velocity_column + 3]
+        limit_speed_at(w, velocity, loop.max_speed_m_s, loop.period_s)
+        for k in range(2):
+            joints[k] = plant.joints[i, k] + half * plant.joint_rates[i, k]
+        for k in range(len(swing)):
+            swing[k] = plant.swing[i, k] + half * plant.swing_rate[i, k]
+        generalized_forces_at(
+            loop.model,
+            w,
+            joints,
+            plant.joint_rates[i],
+            plant.base_velocity[i],
+            swing,
+            plant.swing_rate[i],
+            forces[i],
+        )
