@@ -96,7 +96,18 @@ class Times:
         return Figure.of(f"{name} beyond physics", extra, "µs per step")
 
 
-def take_turns(candidates: Iterable[Candidate], *, rounds: int, turn_s: float) -> Times:
+def undisturbed(seconds: Array) -> float:
+    """Return what a call takes while nothing else runs: the fastest tenth of a turn's calls."""
+    return float(np.quantile(seconds, 0.1))
+
+
+def take_turns(
+    candidates: Iterable[Candidate],
+    *,
+    rounds: int,
+    turn_s: float,
+    summary: Callable[[Array], float] = np.mean,
+) -> Times:
     """Time all candidates in turn, several rounds, and close them.
 
     The first round warms up and does not count.
@@ -105,29 +116,36 @@ def take_turns(candidates: Iterable[Candidate], *, rounds: int, turn_s: float) -
         candidates: with different names.
         rounds: how many count.
         turn_s: least timed seconds of a turn.
+        summary: makes one value of the seconds of a turn's calls.
     """
     candidates = list(candidates)
     seconds: dict[str, list[float]] = {candidate.name: [] for candidate in candidates}
     try:
         for candidate in candidates:
-            _turn(candidate, turn_s, least_calls=_WARM_UP_CALLS)
+            _turn(candidate, turn_s, summary, least_calls=_WARM_UP_CALLS)
         for _ in range(rounds):
             for candidate in candidates:
-                seconds[candidate.name].append(_turn(candidate, turn_s))
+                seconds[candidate.name].append(_turn(candidate, turn_s, summary))
     finally:
         for candidate in candidates:
             candidate.close()
     return Times({name: np.array(values) for name, values in seconds.items()})
 
 
-def _turn(candidate: Candidate, turn_s: float, *, least_calls: int = 1) -> float:
+def _turn(
+    candidate: Candidate,
+    turn_s: float,
+    summary: Callable[[Array], float],
+    *,
+    least_calls: int = 1,
+) -> float:
     """Return the seconds per environment step in one turn."""
     step, prepare, clock = candidate.step, candidate.prepare, time.perf_counter
-    elapsed, calls = 0.0, 0
-    while elapsed < turn_s or calls < least_calls:
+    elapsed, calls = 0.0, []
+    while elapsed < turn_s or len(calls) < least_calls:
         prepare()
         begin = clock()
         step()
-        elapsed += clock() - begin
-        calls += 1
-    return elapsed / (calls * candidate.num_envs)
+        calls.append(clock() - begin)
+        elapsed += calls[-1]
+    return summary(np.array(calls)) / candidate.num_envs

@@ -38,10 +38,11 @@ class InnerLoop:
 
     Args:
         config: the environment's definition.
-        num_envs: n.
+        forces: where they will be written, (n, 4).
     """
 
-    def __init__(self, config: TransportConfig, num_envs: int) -> None:
+    def __init__(self, config: TransportConfig, forces: Array) -> None:
+        num_envs = len(forces)
         self._mode, task = config.control_mode, config.task
         self.action_size = 3 if self._mode == "task" else 4
         self._shape = (num_envs, self.action_size)
@@ -60,11 +61,10 @@ class InnerLoop:
             period_s=float(task.control_period_s),
             velocity_column=layout.slices["grasp_velocity_b"].start,
         )
-        actions, forces = np.empty(self._shape), np.empty((num_envs, 4))
+        actions = np.empty(self._shape)
         observations = np.empty((num_envs, layout.size))
         state = PlantState.empty(num_envs, config.beam.segment_count)
         self._clip = machine_code(_clip, actions)
-        self._hold = machine_code(_hold, self._constants.model, state.joints, state.swing, forces)
         self._scale = machine_code(_scale, self._force_limits, actions, forces)
         self._linearize = machine_code(
             _linearize, self._constants, actions, observations, state, forces
@@ -98,35 +98,21 @@ class InnerLoop:
             )
         return values
 
-    def forces(self, actions: Array, observations: Array, plant: PlantState) -> Array:
-        """Return T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
+    def write_forces(
+        self, actions: Array, observations: Array, plant: PlantState, forces: Array
+    ) -> None:
+        """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
 
         Args:
             actions: clipped, (n, k).
             observations: the last ones, (n, size); they hold the grasp's velocity.
             plant: the true state, which the feedback linearization measures without noise.
+            forces: the simulation's ``generalized_forces``.
         """
-        forces = np.empty((len(actions), 4))
         if self._mode == "force":
             self._scale(self._force_limits, actions, forces)
         else:
             self._linearize(self._constants, actions, observations, plant, forces)
-        return forces
-
-    def holding_forces(self, joints: Array, swing: Array) -> Array:
-        """Return the T_r, (k, 4), that holds robots at ``joints`` (k, 2) and ``swing`` (k, N)."""
-        forces = np.empty((len(joints), 4))
-        self._hold(self._constants.model, joints, swing, forces)
-        return forces
-
-
-@compiled
-def _hold(model: NominalModel, joints: Array, swing: Array, forces: Array) -> None:
-    still = np.zeros(3 + swing.shape[1])
-    for i in range(len(forces)):
-        generalized_forces_at(
-            model, still[:3], joints[i], still[:2], still[:2], swing[i], still[3:], forces[i]
-        )
 
 
 @compiled

@@ -70,6 +70,16 @@ class Scores(NamedTuple):
         return Scores(self.observations.copy(), self.flags.copy(), self.numbers.copy())
 
     @property
+    def told_flags(self) -> BoolArray:
+        """``FLAGS``, (3, n)."""
+        return self.flags[:_TERMINATED]
+
+    @property
+    def measures(self) -> Array:
+        """``MEASURES``, (12, n)."""
+        return self.numbers[:_REWARD]
+
+    @property
     def rewards(self) -> Array:
         """The sum of the reward terms, (n,)."""
         rewards: Array = self.numbers[_REWARD]

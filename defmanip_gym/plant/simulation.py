@@ -81,7 +81,13 @@ class Simulation:
         self._lead = machine_code(
             _lead_no_slip, self._position, self._velocity, self._period_s, self._lateral_target
         )
-        self._extrapolate = machine_code(_extrapolate, self._readings, self._grasp_force_s)
+        self._conclude = machine_code(
+            _conclude,
+            self._readings,
+            self._grasp_force_s,
+            self._sentinel,
+            np.zeros(count, dtype=np.bool_),
+        )
         self.count = count
 
     def read(self) -> PlantState:
@@ -109,14 +115,23 @@ class Simulation:
         angles = np.concatenate((pose, joints, swing), axis=1, dtype=np.float64)
         _place(ids, angles, self._position)
 
+    def report(self, ids: NDArray[np.intp], grasp_force_b: Array) -> None:
+        """Let ``read`` report a known grasp force, (k, 3) N, until the next step."""
+        _sense(ids, self._position, grasp_force_b, self._grasp_force_s)
+
     def hold(self, ids: NDArray[np.intp], generalized_forces: Array) -> None:
         """Set T_r of simulations, (k, 4), and compute the forces it causes, without stepping."""
         self._control[ids] = generalized_forces
         self._batch.forward(ids)
         self._grasp_force_s[ids] = self._sensed_force[ids]
 
+    @property
+    def generalized_forces(self) -> Array:
+        """T_r = (f_b, α_b, τ1, τ2), (n, 4), to be written; the actuator limits clip it."""
+        return self._control
+
     def apply(self, generalized_forces: Array) -> None:
-        """Set T_r = (f_b, α_b, τ1, τ2), (n, 4); the actuator limits clip it."""
+        """Set T_r, (n, 4)."""
         self._control[:] = generalized_forces
 
     def push_grasp(self, force_b: Array) -> None:
@@ -130,25 +145,22 @@ class Simulation:
         A simulation that diverged holds a meaningless state until it is placed again.
         """
         self._lead(self._position, self._velocity, self._period_s, self._lateral_target)
-        failed = np.zeros(self.count, dtype=np.bool_)
         if self._readings.shape[1] != substeps:
             self._readings = np.empty((self.count, substeps, 3))
+        erring: NDArray[np.intp] | tuple[()] = ()
         try:
-            # The sensor lags the state by one substep, which the force loop would take for
-            # damping, and a forward pass after each period would cost a fifth of the physics. The
-            # last two readings, under the same controls, give the force of this instant to O(h²).
             self._batch.rollout(
                 substeps, record=("sensordata",), out={"sensordata": self._readings}
             )
-            if substeps == 1:
-                self._batch.forward()
         except batch.SimulationError as error:
-            failed[error.ids] = True
-        if substeps == 1:
+            erring = error.ids
+        failed = np.empty(self.count, dtype=np.bool_)
+        self._conclude(self._readings, self._grasp_force_s, self._sentinel, failed)
+        if len(erring):
+            failed[erring] = True
+        if substeps == 1:  # a single reading has no slope
+            self._batch.forward()
             self._grasp_force_s[:] = self._sensed_force
-        else:
-            self._extrapolate(self._readings, self._grasp_force_s)
-        failed |= self._sentinel == 0
         return failed
 
     def materialize(self, index: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -184,11 +196,30 @@ def _place(ids: NDArray[np.intp], angles: Array, position: Array) -> None:
 
 
 @compiled
-def _extrapolate(readings: Array, force: Array) -> None:
-    """Carry readings (n, substeps, 3) one substep beyond the last."""
+def _sense(ids: NDArray[np.intp], position: Array, force_b: Array, force_s: Array) -> None:
+    """Write forces in the base frame as the sensor in the first segment's frame reads them."""
+    for row, i in enumerate(ids):
+        swing = position[i, 3] + position[i, 4] + position[i, 5]
+        c, s = cos(swing), sin(swing)
+        force_s[i, 0] = c * force_b[row, 0] + s * force_b[row, 2]
+        force_s[i, 1] = force_b[row, 1]
+        force_s[i, 2] = c * force_b[row, 2] - s * force_b[row, 0]
+
+
+@compiled
+def _conclude(
+    readings: Array, force: Array, sentinel: NDArray[np.int32], failed: NDArray[np.bool_]
+) -> None:
+    """Extrapolate the force to this instant, and mark the simulations that MuJoCo reset.
+
+    The sensor lags the state by one substep, which the force loop would take for damping, and a
+    forward pass after each period would cost a fifth of the physics. The last two readings, under
+    the same controls, give the force of this instant to O(h²).
+    """
     for i in range(len(force)):
         for k in range(3):
             force[i, k] = 2 * readings[i, -1, k] - readings[i, -2, k]
+        failed[i] = sentinel[i] == 0
 
 
 @compiled

@@ -200,6 +200,24 @@ def velocity_bias_at(
 
 
 @compiled
+def solve_positive_definite(A: Array, b: Array) -> None:
+    """Turn b (k,) into A⁻¹ b by elimination, A (k, k) into its triangular factor.
+
+    Positive definite matrices need no pivots; LAPACK's solver costs more than all the rest here.
+    """
+    for j in range(len(b)):
+        for i in range(j + 1, len(b)):
+            factor = A[i, j] / A[j, j]
+            b[i] -= factor * b[j]
+            for k in range(j, len(b)):
+                A[i, k] -= factor * A[j, k]
+    for j in range(len(b) - 1, -1, -1):
+        for k in range(j + 1, len(b)):
+            b[j] -= A[j, k] * b[k]
+        b[j] /= A[j, j]
+
+
+@compiled
 def _mass_matrices(chain: ChainConstants, alpha: Array, M: Array) -> None:
     cosine, sine = np.cos(alpha), np.sin(alpha)
     for i in range(len(alpha)):

@@ -9,7 +9,13 @@ import numpy as np
 
 from defmanip_gym.compiled import compiled
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
-from defmanip_gym.theory.chain import Array, ChainConstants, mass_matrix_at, velocity_bias_at
+from defmanip_gym.theory.chain import (
+    Array,
+    ChainConstants,
+    mass_matrix_at,
+    solve_positive_definite,
+    velocity_bias_at,
+)
 from defmanip_gym.theory.object_model import HangingBeam, hanging_pitch
 from defmanip_gym.theory.redundancy import ReachRule, RedundancyResolution, shared_acceleration
 from defmanip_gym.theory.robot_model import ArmLengths, robot_chain
@@ -163,7 +169,7 @@ def _inverse_dynamics(
         h[j] = -h[j]
         for k in range(4):
             h[j] -= M[j, k] * actuated[k]
-    _solve_positive_definite(M[4:, 4:], h[4:])
+    solve_positive_definite(M[4:, 4:], h[4:])
     for j in range(4):
         forces[j] = h[j]
         for k in range(4):
@@ -172,21 +178,3 @@ def _inverse_dynamics(
             forces[j] += M[j, k] * h[k]
     # from forces conjugate to α̇ to torques conjugate to q̇_a
     forces[2] += forces[3]
-
-
-@compiled
-def _solve_positive_definite(A: Array, b: Array) -> None:
-    """Turn b (k,) into A⁻¹ b by elimination, A (k, k) into its triangular factor.
-
-    Positive definite matrices need no pivots; LAPACK's solver costs more than all the rest here.
-    """
-    for j in range(len(b)):
-        for i in range(j + 1, len(b)):
-            factor = A[i, j] / A[j, j]
-            b[i] -= factor * b[j]
-            for k in range(j, len(b)):
-                A[i, k] -= factor * A[j, k]
-    for j in range(len(b) - 1, -1, -1):
-        for k in range(j + 1, len(b)):
-            b[j] -= A[j, k] * b[k]
-        b[j] /= A[j, j]

@@ -7,13 +7,20 @@ vectors are in the base frame (theory/__init__): there m_o12 does not depend on 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, sin
 
 import numpy as np
 
-from defmanip_gym.compiled import Numbers, compilable
+from defmanip_gym.compiled import Numbers, compilable, compiled
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
-from defmanip_gym.theory.chain import Array, YawingChain, beam_links
+from defmanip_gym.theory.chain import (
+    Array,
+    ChainConstants,
+    YawingChain,
+    beam_links,
+    solve_positive_definite,
+)
 
 
 @compilable
@@ -149,3 +156,37 @@ class HangingBeam:
         partition = self.partition(swing, swing_rate, yaw_rate)
         excess = force - self.bias_force(partition, swing, swing_rate)
         return np.linalg.solve(self.apparent_inertia(partition), excess[..., None])[..., 0] - u_o
+
+
+@compiled
+def held_forces(
+    chain: ChainConstants, k_o22: Array, mass_share: Array, length_share: Array, swing: Array
+) -> Array:
+    """Return the force (10) on beams at rest whose grasp is held still, (n, 3) N.
+
+    Args:
+        chain: constants of the reference beam.
+        k_o22: its stiffness, (N, N) N·m/rad, which all beams share.
+        mass_share: mass of each beam over the reference beam's, (n,).
+        length_share: its length over the reference beam's, (n,).
+        swing: φ, (n, N) rad.
+    """
+    count, segments = swing.shape
+    force = np.zeros((count, 3))
+    inertia, acceleration = np.empty((segments, segments)), np.empty(segments)
+    for i in range(count):
+        mass, length, phi = mass_share[i], length_share[i], swing[i]
+        for j in range(segments):
+            moment = mass * length * chain.first_moments[j]
+            acceleration[j] = -GRAVITY_M_S2 * moment * sin(phi[j])
+            for k in range(segments):
+                acceleration[j] -= k_o22[j, k] * phi[k]
+                coupling = chain.second_moments[j, k] * cos(phi[j] - phi[k])
+                inertia[j, k] = mass * length**2 * (coupling + chain.constant_inertia[j, k])
+        solve_positive_definite(inertia, acceleration)
+        force[i, 2] = GRAVITY_M_S2 * mass * chain.total_mass
+        for j in range(segments):
+            moment = mass * length * chain.first_moments[j]
+            force[i, 0] += moment * cos(phi[j]) * acceleration[j]
+            force[i, 2] += moment * sin(phi[j]) * acceleration[j]
+    return force
