@@ -11,6 +11,7 @@ import numpy as np
 from mujoco import batch
 from numpy.typing import NDArray
 
+from defmanip_gym.plant.divergence import DivergenceSentinel
 from defmanip_gym.plant.rig_model import CARRIAGE_JOINTS, RigModel
 
 Array = NDArray[np.float64]
@@ -55,6 +56,7 @@ class ObjectRig:
         self.timestep_s = float(rig.model.opt.timestep)
         threads = min(count, num_threads or os.cpu_count() or 1)
         self._batch = batch.Batch(rig.model, count, nthread=threads)
+        self._sentinel = DivergenceSentinel(self._batch)
         self._position: Array = self._batch.bind("qpos")
         self._velocity: Array = self._batch.bind("qvel")
         self._control: Array = self._batch.bind("ctrl")
@@ -65,7 +67,7 @@ class ObjectRig:
     def place(self, z2: Array | None = None, z2_rate: Array | None = None) -> None:
         """Start anew with the grasp at rest; z2 (n, N), by default at equilibrium and at rest."""
         self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._batch.warning[:] = 0
+        self._sentinel.arm(np.arange(self.count))
         start = self.rig.equilibrium if z2 is None else z2
         self._position[:, _CARRIAGE:] = start @ self._to_joints.T
         self._velocity[:] = 0.0
@@ -113,7 +115,7 @@ class ObjectRig:
                 inputs[index], trajectory[index] = wanted, reached
         return Shaking(
             peak=peak,
-            diverged=self._diverged(),
+            diverged=self._sentinel.diverged,
             inputs=inputs.swapaxes(0, 1).repeat(hold_steps, axis=1) if record else None,
             z2=trajectory.swapaxes(0, 1) if record else None,
         )
@@ -142,7 +144,7 @@ class ObjectRig:
                 pieces.append(z2)
         return Shaking(
             peak=peak,
-            diverged=self._diverged(),
+            diverged=self._sentinel.diverged,
             inputs=inputs if record else None,
             z2=np.concatenate(pieces, axis=1) if record else None,
         )
@@ -153,10 +155,3 @@ class ObjectRig:
             return
         rates = np.concatenate((self._velocity[:, None, self._yaw], control[..., 3]), axis=1)
         control[..., 3] = np.diff(rates, axis=1) / self.timestep_s
-
-    def _diverged(self) -> NDArray[np.bool_]:
-        # MuJoCo answers a diverged state with a silent reset; only these counters tell
-        warnings = mujoco.mjtWarning
-        bad = [w.value for w in (warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL)]
-        bad.append(warnings.mjWARN_BADQACC.value)
-        return np.asarray(self._batch.warning[:, bad, 1].sum(axis=1) > 0)

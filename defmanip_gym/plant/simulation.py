@@ -16,14 +16,10 @@ from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant import names
 from defmanip_gym.plant.beam_variation import BeamVariation
 from defmanip_gym.plant.builder import build_model
+from defmanip_gym.plant.divergence import DivergenceSentinel
 from defmanip_gym.plant.plant_state import PlantState, read_state
 
 Array = NDArray[np.float64]
-
-# MuJoCo answers a diverged state with a silent reset of simulation and warning counters. A counter
-# of something that cannot happen here, once set, tells of it by being zero again. Counters that
-# are not zero also keep MuJoCo from writing warnings to the terminal and to MUJOCO_LOG.TXT.
-_SENTINEL = mujoco.mjtWarning.mjWARN_CONTACTFULL.value
 
 
 class Simulation:
@@ -67,9 +63,7 @@ class Simulation:
         self._forearm = self.model.body(names.FOREARM).id
         self._forearm_com_m = float(self.model.body(names.FOREARM).ipos[0])
         self._forearm_length_m = robot.forearm.length_m
-        self._warnings: NDArray[np.int32] = self._batch.warning[:, :, 1]
-        self._warnings[:] = 1
-        self._sentinel = self._warnings[:, _SENTINEL]
+        self._sentinel = DivergenceSentinel(self._batch)
         self._segments, self._period_s = beam.segment_count, float(physics_period_s)
         self._read = machine_code(
             read_state,
@@ -85,7 +79,7 @@ class Simulation:
             _conclude,
             self._readings,
             self._grasp_force_s,
-            self._sentinel,
+            self._sentinel.counter,
             np.zeros(count, dtype=np.bool_),
         )
         self.count = count
@@ -111,7 +105,7 @@ class Simulation:
     def place(self, ids: NDArray[np.intp], pose: Array, joints: Array, swing: Array) -> None:
         """Put simulations at rest: ``pose`` (k, 3), ``joints`` (k, 2), ``swing`` (k, N)."""
         self._batch.state[ids] = self._pristine  # what Batch.reset does, a hundred times faster
-        self._warnings[ids] = 1
+        self._sentinel.arm(ids)
         angles = np.concatenate((pose, joints, swing), axis=1, dtype=np.float64)
         _place(ids, angles, self._position)
 
@@ -155,7 +149,7 @@ class Simulation:
         except batch.SimulationError as error:
             erring = error.ids
         failed = np.empty(self.count, dtype=np.bool_)
-        self._conclude(self._readings, self._grasp_force_s, self._sentinel, failed)
+        self._conclude(self._readings, self._grasp_force_s, self._sentinel.counter, failed)
         if len(erring):
             failed[erring] = True
         if substeps == 1:  # a single reading has no slope

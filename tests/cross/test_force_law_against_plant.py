@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
 from defmanip_gym.theory.frames import world_to_base
@@ -95,3 +96,28 @@ def test_lateral_force_is_mass_times_lateral_acceleration_while_turning(
         plant.step(1)
         state = plant.read()
     assert state.grasp_force_b[0, 1] == pytest.approx(BeamParams().mass_kg * 0.8, rel=0.02)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_first_force_reading_is_the_plants_with_the_grasp_held(count):
+    # no springs or dampers: the plant's integrator makes inertia of what they do in a step of 5 ms
+    beam = BeamParams(segment_count=count, damping=0.0, joint_damping=0.0, joint_stiffness=0.0)
+    env = DeformTransportVectorEnv(4, beam=beam, nominal_beam=beam)
+    start = (-5.0, 2.0, 0.3, np.pi / 2, -np.pi / 2, 0.4)  # at ρ*, so the arm has no self-motion
+    observation, _ = env.reset(options={"start": start})
+    state, simulation = env.engine.plant_state, env.engine.simulation
+    reach = ArmKinematics(RobotParams()).reach_and_height(np.array([np.pi / 2, 0.0]))[0]
+    linearization = FeedbackLinearization(
+        RobotParams(), beam, RedundancyResolution(RobotParams(), goal_reach_m=reach)
+    )
+    still = np.zeros((4, 2))
+    simulation.hold(
+        np.arange(4),
+        linearization.generalized_forces(
+            np.zeros((4, 3)), state.joints, still, still, state.swing, np.zeros_like(state.swing)
+        ),
+    )
+    measured = simulation.read().grasp_force_b
+    reported = env.engine.layout.part(observation, "grasp_force_b")
+    np.testing.assert_allclose(reported, measured, rtol=0, atol=1e-9)
+    assert np.abs(reported[:, 0]).min() > 1.0

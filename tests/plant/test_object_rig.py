@@ -104,8 +104,10 @@ def test_factors_vary_damping_and_springs_only():
     assert np.abs(results[0] - results[2]).max() > 1
 
 
-def test_divergence_is_told():
+def test_divergence_is_told_and_written_nowhere(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo would write its warnings to a file
     beam = BeamParams(segment_count=8, joint_stiffness=1e5, joint_damping=0.0)
     rig = shaken(beam, timestep_s=0.01)
     rig.place(np.linspace(0, 0.1, 8)[None])
     assert rig.play(np.zeros((1, 300, 4))).diverged.all()
+    assert not list(tmp_path.iterdir()) and capfd.readouterr().err == ""

@@ -1,0 +1,62 @@
+"""Machine code is current, and computes what the source says."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import defmanip_gym
+from defmanip_gym.compiled import sources_stamp
+from defmanip_gym.theory.chain import mass_matrix_at
+
+EPISODE = """
+import gymnasium, numpy as np
+env = gymnasium.make_vec(
+    "defmanip_gym:DeformTransport-v0", num_envs=2, control_mode="{mode}", max_episode_steps=8
+)
+observation, _ = env.reset(seed=3)
+total = np.zeros(2)
+for action in np.random.default_rng(0).uniform(-0.5, 0.5, (20, *env.action_space.shape)):
+    observation, reward, *_ = env.step(action)
+    total += reward
+print(" ".join(f"{{value:.12e}}" for value in (*observation.ravel(), *total)))
+"""
+
+
+def test_stamp_changes_with_compiled_sources_and_constants_only(tmp_path):
+    def stamp(name, **changes):
+        package = tmp_path / name
+        (package / "part").mkdir(parents=True)
+        sources = {"params": "G = 9.81", "callee": "from x import compiled", "other": "A = 1"}
+        for module, text in {**sources, **changes}.items():
+            folder = package if module == "params" else package / "part"
+            (folder / f"{module}.py").write_text(text)
+        return sources_stamp(package)
+
+    first = stamp("first")
+    assert first == stamp("elsewhere", other="A = 2")
+    assert first != stamp("edited", callee="from x import compiled, compilable")
+    assert first != stamp("on the moon", params="G = 1.62")
+
+
+def test_machine_code_on_disk_is_dated_by_all_compiled_sources():
+    package = Path(defmanip_gym.__file__).parent
+    assert mass_matrix_at._cache._cache_file._source_stamp == sources_stamp(package)
+
+
+def test_compiled_and_interpreted_steps_agree():
+    for mode in ("task", "force"):
+        compiled, interpreted = (
+            subprocess.run(
+                [sys.executable, "-c", EPISODE.format(mode=mode)],
+                env={**os.environ, "NUMBA_DISABLE_JIT": disable},
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+            for disable in ("0", "1")
+        )
+        values = [np.array(text.split(), dtype=float) for text in (compiled, interpreted)]
+        np.testing.assert_allclose(*values, rtol=1e-9, atol=1e-9)
