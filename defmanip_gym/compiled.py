@@ -13,11 +13,13 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numba
 import numba.extending
+from filelock import FileLock
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 # In functions that are both: a number in compiled code, an array (...) when called from Python.
@@ -34,7 +36,8 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
     """
     jitted = numba.njit(nogil=True, error_model="numpy")(function)
     if hasattr(jitted, "_cache"):  # not with NUMBA_DISABLE_JIT=1, which leaves plain Python
-        jitted._cache = _PackageCache(function)
+        with suppress(RuntimeError):  # no folder can be written: compile anew in every process
+            jitted._cache = _PackageCache(function)
     result: Callable[Parameters, Result] = jitted
     return result
 
@@ -68,18 +71,24 @@ def machine_code(
     return result
 
 
+def compiled_sources(package: Path) -> list[Path]:
+    """Return the modules of a package that machine code may have been made of.
+
+    Those are the ones that import this module, and the top level, for constants.
+    """
+    return sorted(
+        path
+        for path in package.rglob("*.py")
+        if path.parent == package or b"compiled import" in path.read_bytes()
+    )
+
+
 @functools.cache
 def sources_stamp(package: Path) -> str:
-    """Return a hash of all that compiled functions of a package may have been made of.
-
-    Those are its modules that import this one, and the top level, for constants.
-    """
+    """Return a hash of ``compiled_sources``."""
     digest = hashlib.blake2b(digest_size=16)
-    top_level = set(package.glob("*.py"))
-    for path in sorted(package.rglob("*.py")):
-        content = path.read_bytes()
-        if path in top_level or b"import compil" in content:
-            digest.update(content)
+    for path in compiled_sources(package):
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -88,8 +97,20 @@ class _PackageCache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call]
+        self._lock = FileLock(Path(self._cache_path) / f"{self._impl.filename_base}.lock")
         self._cache_file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
             source_stamp=sources_stamp(Path(__file__).parent),
         )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the machine code for a signature, or None."""
+        loaded = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        # processes that save at once without a lock leave files of other signatures
+        return loaded if loaded is not None and loaded.signature.args == tuple(sig) else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save machine code; one process at a time, as Numba chooses file names by an index."""
+        with self._lock:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]

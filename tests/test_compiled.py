@@ -1,14 +1,16 @@
 """Machine code is current, and computes what the source says."""
 
+import ast
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 
 import defmanip_gym
-from defmanip_gym.compiled import sources_stamp
+from defmanip_gym.compiled import compiled, compiled_sources, sources_stamp
 from defmanip_gym.theory.chain import mass_matrix_at
 
 EPISODE = """
@@ -29,7 +31,11 @@ def test_stamp_changes_with_compiled_sources_and_constants_only(tmp_path):
     def stamp(name, **changes):
         package = tmp_path / name
         (package / "part").mkdir(parents=True)
-        sources = {"params": "G = 9.81", "callee": "from x import compiled", "other": "A = 1"}
+        sources = {
+            "params": "G = 9.81",
+            "callee": "from x.compiled import compiled",
+            "other": "A = 1",
+        }
         for module, text in {**sources, **changes}.items():
             folder = package if module == "params" else package / "part"
             (folder / f"{module}.py").write_text(text)
@@ -37,8 +43,39 @@ def test_stamp_changes_with_compiled_sources_and_constants_only(tmp_path):
 
     first = stamp("first")
     assert first == stamp("elsewhere", other="A = 2")
-    assert first != stamp("edited", callee="from x import compiled, compilable")
+    assert first != stamp("edited", callee="from x.compiled import compilable")
     assert first != stamp("on the moon", params="G = 1.62")
+
+
+def test_every_module_with_compiled_functions_counts():
+    package = Path(defmanip_gym.__file__).parent
+    importing = {
+        path
+        for path in package.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.module == "defmanip_gym.compiled"
+    }
+    assert len(importing) > 10
+    assert importing <= set(compiled_sources(package))
+
+
+def test_machine_code_of_another_signature_is_not_taken():
+    @compiled
+    def doubled(x):
+        return 2 * x
+
+    integer, real = numba.int64, numba.float64
+    doubled.compile((integer,))
+    doubled.compile((real,))
+    cache = doubled._cache
+    files = {key[0]: name for key, name in cache._cache_file._load_index().items()}
+    folder = Path(cache._cache_path)
+    (folder / files[(real,)]).write_bytes((folder / files[(integer,)]).read_bytes())
+    assert cache.load_overload((integer,), doubled.targetctx) is not None
+    assert cache.load_overload((real,), doubled.targetctx) is None
+    for name in files.values():
+        (folder / name).unlink()
+    cache.flush()
 
 
 def test_machine_code_on_disk_is_dated_by_all_compiled_sources():

@@ -120,7 +120,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     | beam            | `BeamParams()`   | true beam                                              |
     | beam_ranges     | none (`BeamRanges()`) | damping, mass, length to draw each episode from   |
     | nominal_robot   | `None`           | robot of the feedback linearization; the true one      |
-    | nominal_beam    | `None`           | its beam; the true one with no damping at the root     |
+    | nominal_beam    | `None`           | its beam; `beam` with no damping at the root           |
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
     | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
 

@@ -117,7 +117,11 @@ class TransportEngine:
         """What the last step or reset tells beside observation and reward, by name, (n,) each."""
         scores = self._scores
         return dict(
-            zip(_INFO_KEYS, chain(scores.told_flags, scores.measures, self._beams), strict=True)
+            zip(
+                _INFO_KEYS,
+                chain(scores.told_flags, scores.measures, self._beams.copy()),
+                strict=True,
+            )
         )
 
     @property
@@ -166,36 +170,35 @@ class TransportEngine:
         self._place(ids, starts)
         self._steps[ids] = 0
         self._is_started = True
-        self.simulation.read_into(self._plant)
+        self.simulation.read_into(self._plant, ids)
         self._scores = self._scores.copy()
         self._score_starts(self._task, self._goal, self._plant, ids, self._scores)
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
         return self._scores.observations, self.info
 
-    def step(self, actions: Any) -> Scores:
+    def step(self, actions: Any, *, idle: BoolArray | None = None) -> Scores:
         """Advance all episodes by one control period.
 
         Args:
             actions: (n, 3) task accelerations over ``max_acceleration_m_s2`` in the base frame,
                 or (n, 4) forces over the actuator limits; values beyond ±1 are clipped.
+            idle: episodes that have ended and only go along, (n,); their actions do not matter.
 
         Raises:
             ActionError: wrong shape or values that are not finite.
             ResetNeeded: no episode has been started.
         """
         self._require_start()
-        actions = self._inner_loop.clipped(actions)
+        actions = self._inner_loop.clipped(actions, idle)
         before = self._scores
-        self._inner_loop.write_forces(
-            actions, before.observations, self._plant, self.simulation.generalized_forces
-        )
+        self._inner_loop.write_forces(actions, self._plant, self.simulation.generalized_forces)
         if self.config.disturbance.has_force:
             self.simulation.push_grasp(self._disturbing_force())
         failed = self.simulation.step(self.config.task.substeps)
         self._steps += 1
         self._plant, self._plant_before = self._plant_before, self._plant
-        self.simulation.read_into(self._plant)
+        self.simulation.read_into(self._plant, self._all)
         if np.count_nonzero(failed):
             _freeze(self._plant, self._plant_before, failed)
         self._scores = Scores.empty(self.num_envs, self.layout.size)
@@ -209,7 +212,8 @@ class TransportEngine:
             before,
             self._scores,
         )
-        self._noise.add(self._scores.observations, self._all)
+        awake = self._all if idle is None else np.flatnonzero(~idle)
+        self._noise.add(self._scores.observations, awake)
         return self._scores
 
     def _require_start(self) -> None:

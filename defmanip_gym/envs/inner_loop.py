@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ActionError
-from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.control_laws import limit_speed_at
 from defmanip_gym.theory.feedback_linearization import (
@@ -19,8 +18,10 @@ from defmanip_gym.theory.feedback_linearization import (
     generalized_forces_at,
 )
 from defmanip_gym.theory.redundancy import RedundancyResolution
+from defmanip_gym.theory.robot_model import ArmLengths, grasp_velocity
 
 Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 
 class LoopConstants(NamedTuple):
@@ -30,7 +31,7 @@ class LoopConstants(NamedTuple):
     max_acceleration_m_s2: float
     max_speed_m_s: float
     period_s: float
-    velocity_column: int
+    arm: ArmLengths
 
 
 class InnerLoop:
@@ -53,25 +54,25 @@ class InnerLoop:
             config.believed_beam,
             RedundancyResolution(config.believed_robot, goal_reach_m=reach_m),
         )
-        layout = ObservationLayout(config.beam.segment_count)
         self._constants = LoopConstants(
             model=linearization.model,
             max_acceleration_m_s2=float(task.max_acceleration_m_s2),
             max_speed_m_s=float(task.max_speed_m_s),
             period_s=float(task.control_period_s),
-            velocity_column=layout.slices["grasp_velocity_b"].start,
+            arm=ArmLengths.of(config.robot),
         )
         actions = np.empty(self._shape)
-        observations = np.empty((num_envs, layout.size))
         state = PlantState.empty(num_envs, config.beam.segment_count)
         self._clip = machine_code(_clip, actions)
         self._scale = machine_code(_scale, self._force_limits, actions, forces)
-        self._linearize = machine_code(
-            _linearize, self._constants, actions, observations, state, forces
-        )
+        self._linearize = machine_code(_linearize, self._constants, actions, state, forces)
 
-    def clipped(self, actions: Any) -> Array:
+    def clipped(self, actions: Any, idle: BoolArray | None = None) -> Array:
         """Return the actions, (n, k), clipped to [-1, 1].
+
+        Args:
+            actions: as given to the environment.
+            idle: whose action does not matter, whatever it is, and counts as zero, (n,).
 
         Raises:
             ActionError: wrong shape or values that are not finite.
@@ -89,6 +90,8 @@ class InnerLoop:
                 f"{self._shape} in {self._mode!r} control mode",
                 "Check the environment's action_space.",
             )
+        if idle is not None:
+            values[idle] = 0.0
         if not self._clip(values):
             raise ActionError(
                 "action",
@@ -98,21 +101,18 @@ class InnerLoop:
             )
         return values
 
-    def write_forces(
-        self, actions: Array, observations: Array, plant: PlantState, forces: Array
-    ) -> None:
+    def write_forces(self, actions: Array, plant: PlantState, forces: Array) -> None:
         """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
 
         Args:
             actions: clipped, (n, k).
-            observations: the last ones, (n, size); they hold the grasp's velocity.
             plant: the true state, which the feedback linearization measures without noise.
             forces: the simulation's ``generalized_forces``.
         """
         if self._mode == "force":
             self._scale(self._force_limits, actions, forces)
         else:
-            self._linearize(self._constants, actions, observations, plant, forces)
+            self._linearize(self._constants, actions, plant, forces)
 
 
 @compiled
@@ -134,16 +134,20 @@ def _scale(limits: Array, actions: Array, forces: Array) -> None:
 
 
 @compiled
-def _linearize(
-    loop: LoopConstants, actions: Array, observations: Array, plant: PlantState, forces: Array
-) -> None:
+def _linearize(loop: LoopConstants, actions: Array, plant: PlantState, forces: Array) -> None:
     # the forces act for a whole period: take them where the motion will be half-way through it
     half = 0.5 * loop.period_s
-    w, joints, swing = np.empty(3), np.empty(2), np.empty(plant.swing.shape[1])
+    w, velocity = np.empty(3), np.empty(3)
+    joints, swing = np.empty(2), np.empty(plant.swing.shape[1])
     for i in range(len(actions)):
         for k in range(3):
             w[k] = actions[i, k] * loop.max_acceleration_m_s2
-        velocity = observations[i, loop.velocity_column : loop.velocity_column + 3]
+        upper, upper_rate = plant.joints[i, 0], plant.joint_rates[i, 0]
+        fore, fore_rate = upper + plant.joints[i, 1], upper_rate + plant.joint_rates[i, 1]
+        u1, u2 = plant.base_velocity[i, 0], plant.base_velocity[i, 1]
+        velocity[0], velocity[1], velocity[2] = grasp_velocity(
+            loop.arm, upper, fore, upper_rate, fore_rate, u1, u2
+        )
         limit_speed_at(w, velocity, loop.max_speed_m_s, loop.period_s)
         for k in range(2):
             joints[k] = plant.joints[i, k] + half * plant.joint_rates[i, k]

@@ -29,6 +29,8 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
         StartError: unknown option, or a start that is not six finite numbers (or six for each
             of ``count`` environments).
     """
+    if not isinstance(options, Mapping | None):
+        raise StartError("options", options, "a dict or None", "Write {'start': ...}.")
     if not options:
         return None
     unknown = set(options) - {"start"}

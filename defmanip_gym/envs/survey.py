@@ -14,7 +14,7 @@ from defmanip_gym.envs.task import TaskState
 from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.frames import turned
-from defmanip_gym.theory.robot_model import ArmLengths, reach_and_height, reach_and_height_slopes
+from defmanip_gym.theory.robot_model import ArmLengths, grasp_velocity, reach_and_height
 from defmanip_gym.theory.velocity_field import streamline_heading
 
 Array = NDArray[np.float64]
@@ -85,9 +85,7 @@ def survey(goal: Goal, plant: PlantState, i: int, observation: Array) -> TaskSta
     fore_rate = upper_rate + plant.joint_rates[i, 1]
 
     reach, height = reach_and_height(goal.arm, upper, fore)
-    rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(goal.arm, upper, fore)
-    forward = u1 + rho_1 * upper_rate + rho_2 * fore_rate
-    left, up = reach * u2, z_1 * upper_rate + z_2 * fore_rate
+    forward, left, up = grasp_velocity(goal.arm, upper, fore, upper_rate, fore_rate, u1, u2)
 
     ahead, aside = turned(
         goal.x_m - plant.base_pose[i, 0], goal.y_m - plant.base_pose[i, 1], -heading

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import operator
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -129,17 +130,12 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         Raises:
             StartError: bad options, or seeds of another number than n.
         """
+        if not isinstance(options, Mapping | None):
+            raise StartError("options", options, "a dict or None", "Write {'start': ...}.")
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
         ids = np.arange(self.num_envs) if mask is None else self._masked(mask)
-        if seed is None or isinstance(seed, int | np.integer):
-            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
-        else:
-            seeds = list(seed)
-            if len(seeds) != self.num_envs:
-                raise StartError(
-                    "seed", seed, f"a number or {self.num_envs} of them", "Give one per episode."
-                )
+        seeds = self._seeds(seed)
         observation, info = self.engine.reset(ids, seeds=[seeds[i] for i in ids], options=options)
         self._ended[ids] = False
         return observation, info
@@ -164,6 +160,28 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             self._ended = np.zeros(self.num_envs, dtype=bool)
         return observation, scores.rewards, scores.terminated, truncated, info
 
+    def _seeds(self, seed: Any) -> list[int | None]:
+        """Return a seed, or None, for each episode."""
+        seeds: list[int | None] = [None] * self.num_envs
+        if seed is None:
+            return seeds
+        try:
+            if not np.ndim(seed):
+                first = operator.index(seed)
+                seeds = [first + i for i in range(self.num_envs)]
+            else:
+                seeds = [None if each is None else operator.index(each) for each in seed]
+        except (TypeError, ValueError):
+            seeds = []
+        if len(seeds) != self.num_envs or any(each is not None and each < 0 for each in seeds):
+            raise StartError(
+                "seed",
+                seed,
+                f"a whole number >= 0, or {self.num_envs} of them or None",
+                "Give one per episode.",
+            )
+        return seeds
+
     def _masked(self, mask: Any) -> NDArray[np.intp]:
         values = np.asarray(mask)
         if values.shape != (self.num_envs,) or values.dtype != bool or not values.any():
@@ -180,7 +198,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     ) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
         """Step the running episodes and start those that ended in the previous step."""
         fresh = self._ended
-        scores = self.engine.step(np.where(fresh[:, None], 0.0, actions))
+        scores = self.engine.step(actions, idle=fresh)
         observation, info = self.engine.reset(np.flatnonzero(fresh))
         truncated = (self.engine.steps >= self.max_episode_steps) & ~scores.terminated & ~fresh
         terminated = scores.terminated & ~fresh

@@ -70,9 +70,12 @@ class BeamVariation:
         self._batch.set_const(ids)
 
     def write_to(self, model: mujoco.MjModel, index: int) -> None:
-        """Give a model of the plant the beam that simulation ``index`` carries, to draw it."""
+        """Give a copy of the model the beam that simulation ``index`` carries, to draw it."""
         for field, rows in self._rows.items():
             getattr(model, field)[:] = rows[index]
+        if self._rows:
+            model.geom_rbound[self._geoms] = model.geom_size[self._geoms, :2].sum(axis=1)
+            mujoco.mj_setConst(model, mujoco.MjData(model))  # cameras refer to centres of mass
 
     def _write(
         self, field: str, ids: NDArray[np.intp], objects: NDArray[np.intp], values: Array

@@ -56,16 +56,19 @@ class PlantState(NamedTuple):
 
 
 @compiled
-def read_state(position: Array, velocity: Array, force_s: Array, state: PlantState) -> None:
+def read_state(
+    ids: NDArray[np.intp], position: Array, velocity: Array, force_s: Array, state: PlantState
+) -> None:
     """Fill in the state for MuJoCo's qpos and qvel.
 
     Args:
+        ids: the simulations to read.
         position: x, y, θ and the hinges' relative angles, (n, 5 + N).
         velocity: their rates, (n, 5 + N).
         force_s: on the object at the grasp, (n, 3) N in the frame of the first segment.
         state: to be filled in.
     """
-    for i in range(len(position)):
+    for i in ids:
         heading = position[i, 2]
         c, s = cos(heading), sin(heading)
         for k in range(3):

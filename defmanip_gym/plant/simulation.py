@@ -22,6 +22,10 @@ from defmanip_gym.plant.plant_state import PlantState, read_state
 Array = NDArray[np.float64]
 
 
+# MuJoCo takes states for diverged beyond 1e10 only; no robot moves at 1e4 m/s or rad/s
+_FASTEST = 1e4
+
+
 class Simulation:
     """n copies of the plant, stepped together on a thread pool.
 
@@ -65,8 +69,10 @@ class Simulation:
         self._forearm_length_m = robot.forearm.length_m
         self._sentinel = DivergenceSentinel(self._batch)
         self._segments, self._period_s = beam.segment_count, float(physics_period_s)
+        self._all = np.arange(count)
         self._read = machine_code(
             read_state,
+            self._all,
             self._position,
             self._velocity,
             self._grasp_force_s,
@@ -78,6 +84,7 @@ class Simulation:
         self._conclude = machine_code(
             _conclude,
             self._readings,
+            self._velocity,
             self._grasp_force_s,
             self._sentinel.counter,
             np.zeros(count, dtype=np.bool_),
@@ -87,12 +94,12 @@ class Simulation:
     def read(self) -> PlantState:
         """Return the current state and the grasp force at this instant."""
         state = PlantState.empty(self.count, self._segments)
-        self.read_into(state)
+        self.read_into(state, self._all)
         return state
 
-    def read_into(self, state: PlantState) -> None:
-        """Fill in a state of n simulations."""
-        self._read(self._position, self._velocity, self._grasp_force_s, state)
+    def read_into(self, state: PlantState, ids: NDArray[np.intp]) -> None:
+        """Fill in the rows ``ids`` of a state of n simulations."""
+        self._read(ids, self._position, self._velocity, self._grasp_force_s, state)
 
     def carry(self, ids: NDArray[np.intp], beams: Sequence[BeamParams]) -> None:
         """Let simulations carry other beams than the given one; place them afterwards.
@@ -149,7 +156,9 @@ class Simulation:
         except batch.SimulationError as error:
             erring = error.ids
         failed = np.empty(self.count, dtype=np.bool_)
-        self._conclude(self._readings, self._grasp_force_s, self._sentinel.counter, failed)
+        self._conclude(
+            self._readings, self._velocity, self._grasp_force_s, self._sentinel.counter, failed
+        )
         if len(erring):
             failed[erring] = True
         if substeps == 1:  # a single reading has no slope
@@ -202,17 +211,25 @@ def _sense(ids: NDArray[np.intp], position: Array, force_b: Array, force_s: Arra
 
 @compiled
 def _conclude(
-    readings: Array, force: Array, sentinel: NDArray[np.int32], failed: NDArray[np.bool_]
+    readings: Array,
+    velocity: Array,
+    force: Array,
+    sentinel: NDArray[np.int32],
+    failed: NDArray[np.bool_],
 ) -> None:
-    """Extrapolate the force to this instant, and mark the simulations that MuJoCo reset.
+    """Extrapolate the force to this instant, and mark the simulations that diverged.
 
     The sensor lags the state by one substep, which the force loop would take for damping, and a
     forward pass after each period would cost a fifth of the physics. The last two readings, under
     the same controls, give the force of this instant to O(h²).
     """
+    last = readings.shape[1] - 1
     for i in range(len(force)):
         for k in range(3):
-            force[i, k] = 2 * readings[i, -1, k] - readings[i, -2, k]
+            force[i, k] = 2 * readings[i, last, k] - readings[i, max(last - 1, 0), k]
+        for k in range(velocity.shape[1]):
+            if not abs(velocity[i, k]) < _FASTEST:
+                sentinel[i] = 0
         failed[i] = sentinel[i] == 0
 
 

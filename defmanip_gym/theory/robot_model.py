@@ -69,6 +69,23 @@ def reach_and_height_bias(
     return -z_1 * squared_1 - z_2 * squared_2, rho_1 * squared_1 + rho_2 * squared_2
 
 
+@compilable
+def grasp_velocity(
+    arm: ArmLengths,
+    upper: Numbers,
+    fore: Numbers,
+    upper_rate: Numbers,
+    fore_rate: Numbers,
+    u1: Numbers,
+    u2: Numbers,
+) -> tuple[Numbers, Numbers, Numbers]:
+    """Return ẋ_a = J_A u, Eq. (1), in the base frame: forward, left and up, (...) m/s each."""
+    rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
+    forward = u1 + rho_1 * upper_rate + rho_2 * fore_rate
+    left = reach_and_height(arm, upper, fore)[0] * u2
+    return forward, left, z_1 * upper_rate + z_2 * fore_rate
+
+
 class ArmKinematics:
     """Where the grasp is, and how it moves: Eq. (1) in the base frame.
 

@@ -116,18 +116,22 @@ class ActionScaling:
         limit = self._certificate.conditions.initial_swing_rad + _ROUNDING
         return np.asarray(self._covers & (swing <= limit))
 
-    def scale(self, actions: Array, observation: Array) -> tuple[Array, Array]:
+    def scale(
+        self, actions: Array, observation: Array, idle: BoolArray | None = None
+    ) -> tuple[Array, Array]:
         """Return certified actions (n, 3) and by how much w changed, (n,) m/s².
 
         Args:
             actions: normalized, (n, 3).
             observation: what the environment last returned, (n, size).
+            idle: episodes whose actions do not matter, (n,); none by default.
 
         Raises:
             ActionError: actions that are not finite or of another shape.
         """
         task, part = self._config.task, partial(self._layout.part, observation)
-        actions = _finite_numbers(actions, (len(observation), 3))
+        awake = np.ones(len(observation), dtype=bool) if idle is None else ~idle
+        actions = _finite_numbers(actions, awake)
         velocity = part("grasp_velocity_b")
         heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
         w = np.clip(actions, -1.0, 1.0) * task.max_acceleration_m_s2
@@ -149,8 +153,8 @@ class ActionScaling:
             command=certified,
             known=np.ones(len(certified), dtype=bool),
         )
-        change = np.sqrt(((certified - w) ** 2).sum(axis=1))
-        self.steps += len(change)
+        change = np.where(awake, np.sqrt(((certified - w) ** 2).sum(axis=1)), 0.0)
+        self.steps += int(awake.sum())
         self.interventions += int((change > _ROUNDING).sum())
         self.total_intervention_m_s2 += float(change.sum())
         return certified / limit, change
@@ -167,7 +171,8 @@ class NuMaxActionScaling(
     """Keeps every action of a single environment within a certificate.
 
     ``info`` gains ``intervened`` (bool), ``intervention_m_s2`` (change of w) and
-    ``certificate_applies`` (whether the certificate covers this beam and this episode's start);
+    ``certificate_applies`` (whether the certificate covers every beam that episodes may carry, and
+    this episode's start);
     ``scaling`` holds the running counts.
 
     Args:
@@ -190,7 +195,7 @@ class NuMaxActionScaling(
     ) -> tuple[Array, dict[str, Any]]:
         """Start an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._observation = observation
+        self._observation = observation.copy()  # the caller's own from now on
         self._applies = bool(self.scaling.begin(observation[None], np.array([True]))[0])
         return observation, info | self._report(0.0)
 
@@ -200,7 +205,7 @@ class NuMaxActionScaling(
             raise ResetNeeded("Call reset() before the first step().")
         certified, change = self.scaling.scale(np.expand_dims(action, 0), self._observation[None])
         observation, reward, terminated, truncated, info = self.env.step(certified[0])
-        self._observation = observation
+        self._observation = observation.copy()  # the caller's own from now on
         return observation, float(reward), terminated, truncated, info | self._report(change[0])
 
     def _report(self, change: float) -> dict[str, Any]:
@@ -250,13 +255,14 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         """Step with the actions scaled into the certificate."""
         if self._observation is None:
             raise ResetNeeded("Call reset() before the first step().")
-        certified, change = self.scaling.scale(actions, self._observation)
+        mode = self.env.metadata["autoreset_mode"]
+        idle = self._ended if mode is AutoresetMode.NEXT_STEP else None
+        certified, change = self.scaling.scale(actions, self._observation, idle)
         observation, reward, terminated, truncated, info = self.env.step(certified)
         report = self._report(change)
         if "final_info" in info:
             info["final_info"] |= report
         ended = terminated | truncated
-        mode = self.env.metadata["autoreset_mode"]
         if mode is AutoresetMode.NEXT_STEP:
             started, self._ended = self._ended, ended
         else:
@@ -265,7 +271,7 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         return observation, reward, terminated, truncated, info | self._report(change)
 
     def _remember(self, observation: Array, started: NDArray[np.bool_]) -> None:
-        self._observation = observation
+        self._observation = observation.copy()  # the caller's own from now on
         self._applies = np.where(started, self.scaling.begin(observation, started), self._applies)
 
     def _report(self, change: Array) -> dict[str, Any]:
@@ -276,11 +282,14 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         }
 
 
-def _finite_numbers(actions: Any, shape: tuple[int, int]) -> Array:
+def _finite_numbers(actions: Any, awake: BoolArray) -> Array:
+    shape = (len(awake), 3)
     try:
-        values = np.asarray(actions, dtype=np.float64)
+        values = np.array(actions, dtype=np.float64)
     except (TypeError, ValueError):
         values = np.empty(0)
+    if values.shape == shape:
+        values[~awake] = 0.0
     if values.shape != shape or not np.isfinite(values).all():
         raise ActionError("action", actions, f"finite numbers of shape {shape}", "Check them.")
     return values

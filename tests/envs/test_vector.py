@@ -6,10 +6,11 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
-from defmanip_gym.errors import ParameterError, StartError
-from defmanip_gym.params import BeamParams, DisturbanceParams
+from defmanip_gym.errors import ActionError, ParameterError, StartError
+from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, TaskParams
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"
+RANGES = BeamRanges(damping=(0.05, 1.0), mass_kg=(2.5, 3.7))
 NOISE = DisturbanceParams(force_bias_n=0.05, force_sensor_noise_n=0.1)
 
 
@@ -142,6 +143,67 @@ def test_a_failed_simulation_ends_only_its_own_episode():
     assert not terminated.any()
 
 
+def test_a_failed_simulation_stays_frozen_while_others_are_reset():
+    env = make(2, autoreset_mode="Disabled", constraint_mode="cost")
+    env.reset(seed=0)
+    env.unwrapped.engine.simulation._velocity[1] = np.nan
+    *_, info = env.step(np.zeros((2, 3)))
+    distance = info["distance_to_goal"][1]
+    env.reset(options={"reset_mask": np.array([True, False])})
+    _, reward, _, _, info = env.step(np.zeros((2, 3)))
+    assert info["distance_to_goal"][1] == distance and reward[1] < 0
+
+
+def test_absurd_velocities_count_as_failed():
+    env = make(2, autoreset_mode="Disabled", constraint_mode="cost")
+    env.reset(seed=0)
+    env.unwrapped.engine.simulation._velocity[1, 4] = 1e6
+    observation, *_, info = env.step(np.zeros((2, 3)))
+    assert info["simulation_failed"].tolist() == [False, True]
+    assert np.abs(observation).max() < 1e3
+
+
+def test_one_physics_step_per_control_period_reads_the_force_of_that_instant():
+    env = make(3, task=TaskParams(control_period_s=0.005))
+    env.reset(seed=0)
+    observation, *_ = env.step(np.zeros((3, 3)))
+    assert np.isfinite(observation).all()
+
+
+def test_what_callers_do_to_results_does_not_reach_the_episode():
+    spoiled, left = (make(2, autoreset_mode="Disabled", beam_ranges=RANGES) for _ in range(2))
+    for env in (spoiled, left):
+        env.reset(seed=0)
+    for batch in actions(20, 2):
+        theirs, ours = spoiled.step(batch), left.step(batch)
+        assert np.array_equal(theirs[0], ours[0]) and np.array_equal(theirs[1], ours[1])
+        for array in (*theirs[:4], *theirs[4].values()):
+            array[:] = 0
+
+
+@pytest.mark.parametrize("steps", [62, 63])
+def test_noise_of_the_next_episode_does_not_depend_on_the_reset_mode(steps):
+    arguments = {"disturbance": NOISE, "constraint_mode": "cost", "max_episode_steps": steps}
+    same, following = (
+        make(1, autoreset_mode=mode, **arguments) for mode in ("SameStep", "NextStep")
+    )
+    for env in (same, following):
+        env.reset(seed=0)
+    for _ in range(steps):
+        observation, *_ = same.step(np.zeros((1, 3)))
+        following.step(np.zeros((1, 3)))
+    assert np.array_equal(observation, following.step(np.full((1, 3), np.nan))[0])
+
+
+def test_actions_are_checked_in_every_step_of_next_step_mode():
+    env = make(2, autoreset_mode="NextStep", max_episode_steps=1)
+    env.reset(seed=0)
+    env.step(np.zeros((2, 3)))
+    for bad in (np.zeros(3), np.zeros((1, 3)), [[0, 0, 0], [0]], "left", None):
+        with pytest.raises(ActionError):
+            env.step(bad)
+
+
 def test_bad_resets_are_refused_by_name():
     env = make(3, autoreset_mode="Disabled")
     with pytest.raises(ResetNeeded):
@@ -150,8 +212,12 @@ def test_bad_resets_are_refused_by_name():
     for mask in (np.zeros(3, dtype=bool), np.ones(4, dtype=bool), [1, 0, 2]):
         with pytest.raises(StartError, match="booleans"):
             env.reset(options={"reset_mask": mask})
-    with pytest.raises(StartError, match="seed"):
-        env.reset(seed=[1, 2])
+    for seed in ([1, 2], -1, 1.5, [1, 2, -3], [1, 2, "x"]):
+        with pytest.raises(StartError, match="seed"):
+            env.reset(seed=seed)
+    for options in ("paper", [1]):
+        with pytest.raises(StartError, match="options"):
+            env.reset(options=options)
     with pytest.raises(ParameterError, match="autoreset_mode"):
         make(2, autoreset_mode="foo")
 
