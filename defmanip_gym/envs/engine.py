@@ -19,7 +19,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score_starts, score_steps
 from defmanip_gym.envs.sensor_noise import SensorNoise
-from defmanip_gym.envs.starts import check_starts, extreme_starts, requested_starts, sample_starts
+from defmanip_gym.envs.starts import StartSampler, check_starts, extreme_starts, requested_starts
 from defmanip_gym.envs.survey import goal_of
 from defmanip_gym.envs.task import task_of
 from defmanip_gym.envs.workspace import workspace_of
@@ -40,9 +40,17 @@ class TransportEngine:
         config: the environment's definition.
         num_envs: n.
         num_threads: physics threads, 0 for one per CPU.
+        max_episode_steps: control periods until truncation; never by default.
     """
 
-    def __init__(self, config: TransportConfig, num_envs: int, num_threads: int = 0) -> None:
+    def __init__(
+        self,
+        config: TransportConfig,
+        num_envs: int,
+        *,
+        num_threads: int = 0,
+        max_episode_steps: int | None = None,
+    ) -> None:
         check_starts(extreme_starts(config.task.start), config)
         self.config, self.num_envs = config, num_envs
         self.layout = ObservationLayout(config.beam.segment_count)
@@ -59,9 +67,11 @@ class TransportEngine:
         self._inner_loop = InnerLoop(config, self.simulation.generalized_forces)
         self.action_size = self._inner_loop.action_size
         self._generators = [np.random.default_rng(None) for _ in range(num_envs)]
+        self._starts = StartSampler(config.task.start)
         self._noise = SensorNoise(config.disturbance, self.layout, self._generators)
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
         self._beams = np.tile(np.array(_varied(config.beam))[:, None], num_envs)
         self._is_started = False
         self._object = HangingBeam(config.beam)
@@ -87,6 +97,8 @@ class TransportEngine:
             self._plant,
             np.empty((num_envs, self.action_size)),
             np.empty(num_envs, dtype=np.bool_),
+            self._steps,
+            self._last_step,
             self._scores,
             self._scores,
         )
@@ -162,7 +174,7 @@ class TransportEngine:
             if seed is not None:
                 self._generators[index] = np.random.default_rng(seed)
         starts = (
-            sample_starts(self.config.task.start, [self._generators[i] for i in ids])
+            self._starts.sample([self._generators[i] for i in ids])
             if requested is None
             else requested[ids]
         )
@@ -209,6 +221,8 @@ class TransportEngine:
             self._plant,
             actions,
             failed,
+            self._steps,
+            self._last_step,
             before,
             self._scores,
         )

@@ -36,7 +36,7 @@ MEASURES = (
     *RewardTerms._fields,
 )
 # rows of ``Scores.flags`` and ``Scores.numbers`` that follow these
-_TERMINATED = len(FLAGS)
+_TERMINATED, _TRUNCATED = len(FLAGS), len(FLAGS) + 1
 _TERMS = MEASURES.index(RewardTerms._fields[0])
 _REWARD = len(MEASURES)
 _POTENTIALS = _REWARD + 1
@@ -48,7 +48,7 @@ class Scores(NamedTuple):
 
     Attributes:
         observations: (n, size), without sensor noise until that is added.
-        flags: ``FLAGS``, then whether it terminated, (4, n).
+        flags: ``FLAGS``, then whether it terminated and whether it was truncated, (5, n).
         numbers: ``MEASURES``, then reward and potentials, (16, n).
     """
 
@@ -61,7 +61,7 @@ class Scores(NamedTuple):
         """Return scores of ``count`` episodes yet to be filled in."""
         return cls(
             np.empty((count, observation_size)),
-            np.empty((_TERMINATED + 1, count), dtype=np.bool_),
+            np.empty((_TRUNCATED + 1, count), dtype=np.bool_),
             np.empty((_NUMBER_COUNT, count)),
         )
 
@@ -87,9 +87,15 @@ class Scores(NamedTuple):
 
     @property
     def terminated(self) -> BoolArray:
-        """Which episodes ended, (n,)."""
+        """Which episodes ended by what happened in them, (n,)."""
         terminated: BoolArray = self.flags[_TERMINATED]
         return terminated
+
+    @property
+    def truncated(self) -> BoolArray:
+        """Which episodes ended because their time was over, (n,)."""
+        truncated: BoolArray = self.flags[_TRUNCATED]
+        return truncated
 
 
 @compiled
@@ -102,7 +108,7 @@ def score_starts(
         state = survey(goal, plant, i, scores.observations[i])
         outcome = Outcome(is_success(state, task), False, False)
         _report(scores, i, state, outcome, no_reward, potentials(state, task), task)
-        scores.flags[_TERMINATED, i] = False
+        scores.flags[_TERMINATED, i] = scores.flags[_TRUNCATED, i] = False
 
 
 @compiled
@@ -113,6 +119,8 @@ def score_steps(
     plant: PlantState,
     actions: Array,
     failed: BoolArray,
+    steps: NDArray[np.int64],
+    last_step: int,
     before: Scores,
     scores: Scores,
 ) -> None:
@@ -125,6 +133,8 @@ def score_steps(
         plant: the true state.
         actions: normalized, (n, k).
         failed: whose simulation diverged, (n,).
+        steps: control periods since each start, (n,).
+        last_step: the one that truncates.
         before: the scores one step ago.
         scores: to be filled in.
     """
@@ -149,7 +159,9 @@ def score_steps(
         now = potentials(state, task)
         terms = reward_terms(last, now, squared_action, outcome, margin, task)
         _report(scores, i, state, outcome, terms, now, task)
-        scores.flags[_TERMINATED, i] = outcome.success or is_failure(outcome, margin, task)
+        terminated = outcome.success or is_failure(outcome, margin, task)
+        scores.flags[_TERMINATED, i] = terminated
+        scores.flags[_TRUNCATED, i] = steps[i] >= last_step and not terminated
 
 
 @compiled

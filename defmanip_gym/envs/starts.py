@@ -52,10 +52,21 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
     return np.broadcast_to(values, (count, 6)).copy()
 
 
-def sample_starts(params: StartParams, generators: Sequence[np.random.Generator]) -> Array:
-    """Return a start from each generator, (k, 6), uniform within the spread."""
-    drawn = np.array([generator.random(6) for generator in generators])
-    return np.array(params.center) + np.array(params.spread) * (2.0 * drawn - 1.0)
+class StartSampler:
+    """Draws starts, uniform within the spread.
+
+    Args:
+        params: center and spread.
+    """
+
+    def __init__(self, params: StartParams) -> None:
+        self._lowest = np.array(params.center) - np.array(params.spread)
+        self._width = 2.0 * np.array(params.spread)
+
+    def sample(self, generators: Sequence[np.random.Generator]) -> Array:
+        """Return a start from each generator, (k, 6)."""
+        drawn = np.array([generator.random(6) for generator in generators])
+        return self._lowest + self._width * drawn
 
 
 def extreme_starts(params: StartParams) -> Array:

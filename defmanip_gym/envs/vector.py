@@ -107,7 +107,12 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             task=task,
             disturbance=disturbance,
         )
-        self.engine = TransportEngine(self.config, num_envs, num_threads)
+        self.engine = TransportEngine(
+            self.config,
+            num_envs,
+            num_threads=num_threads,
+            max_episode_steps=max_episode_steps,
+        )
         self.single_observation_space = observation_space(self.engine)
         self.single_action_space = action_space(self.engine)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -145,10 +150,9 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._ended.any():
             return self._step_after_reset(actions)
         scores = self.engine.step(actions)
-        truncated = (self.engine.steps >= self.max_episode_steps) & ~scores.terminated
-        self._ended = scores.terminated | truncated
+        self._ended = scores.terminated | scores.truncated
         observation, info = scores.observations, self.engine.info
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self._ended):
             final = {
                 "final_obs": observation,
                 "_final_obs": self._ended,
@@ -158,7 +162,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             observation, info = self.engine.reset(np.flatnonzero(self._ended))
             info |= final
             self._ended = np.zeros(self.num_envs, dtype=bool)
-        return observation, scores.rewards, scores.terminated, truncated, info
+        return observation, scores.rewards, scores.terminated, scores.truncated, info
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """Return a seed, or None, for each episode."""
@@ -200,8 +204,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         fresh = self._ended
         scores = self.engine.step(actions, idle=fresh)
         observation, info = self.engine.reset(np.flatnonzero(fresh))
-        truncated = (self.engine.steps >= self.max_episode_steps) & ~scores.terminated & ~fresh
-        terminated = scores.terminated & ~fresh
+        terminated, truncated = scores.terminated & ~fresh, scores.truncated & ~fresh
         self._ended = terminated | truncated
         return observation, np.where(fresh, 0.0, scores.rewards), terminated, truncated, info
 

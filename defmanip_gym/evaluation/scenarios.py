@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defmanip_gym.envs.starts import PAPER_START, sample_starts
+from defmanip_gym.envs.starts import PAPER_START, StartSampler
 from defmanip_gym.params import StartParams
 from defmanip_gym.validation import require_whole
 
@@ -46,5 +46,5 @@ def comparison_scenarios(count: int) -> tuple[Scenario, ...]:
 
 def _sampled(index: int) -> Scenario:
     seed = FIRST_EVALUATION_SEED + index
-    start = sample_starts(StartParams(), [np.random.default_rng(seed)])[0]
+    start = StartSampler(StartParams()).sample([np.random.default_rng(seed)])[0]
     return Scenario(name=f"sampled-{index:02d}", seed=seed, start=tuple(start.tolist()))
