@@ -67,7 +67,7 @@ class TransportEngine:
         self._inner_loop = InnerLoop(config, self.simulation.generalized_forces)
         self.action_size = self._inner_loop.action_size
         self._generators = [np.random.default_rng(None) for _ in range(num_envs)]
-        self._starts = StartSampler(config.task.start)
+        self._starts = StartSampler(config.task.start, self._generators)
         self._noise = SensorNoise(config.disturbance, self.layout, self._generators)
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
@@ -170,14 +170,9 @@ class TransportEngine:
         requested = requested_starts(options, self.num_envs)
         if requested is not None:
             check_starts(requested[ids], self.config)
-        for index, seed in zip(ids, seeds or (), strict=bool(seeds)):
-            if seed is not None:
-                self._generators[index] = np.random.default_rng(seed)
-        starts = (
-            self._starts.sample([self._generators[i] for i in ids])
-            if requested is None
-            else requested[ids]
-        )
+        if seeds is not None:
+            self._seed(ids, seeds)
+        starts = self._starts.sample(ids) if requested is None else requested[ids]
         self._carry_beams(ids)
         self._place(ids, starts)
         self._steps[ids] = 0
@@ -233,6 +228,12 @@ class TransportEngine:
     def _require_start(self) -> None:
         if not self._is_started:
             raise ResetNeeded("Call reset() before the first step().")
+
+    def _seed(self, ids: Ids, seeds: Sequence[int | None]) -> None:
+        seeded = {i: seed for i, seed in zip(ids.tolist(), seeds, strict=True) if seed is not None}
+        for index, seed in seeded.items():
+            self._generators[index] = np.random.default_rng(seed)
+        self._starts.forget(np.array(list(seeded), dtype=np.intp))
 
     def _carry_beams(self, ids: Ids) -> None:
         """Draw the beams of new episodes, if they are to differ."""

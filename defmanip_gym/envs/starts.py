@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.compiled import compiled
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import StartParams
 
 Array = NDArray[np.float64]
+Ids = NDArray[np.intp]
 
 _LARGEST_HEADING_RAD = 100.0  # more turns than that are a slip of the pen
+
+# A draw costs microseconds however long it is, and random forces end episodes after 14 steps.
+_STARTS_PER_DRAW = 16
 
 PAPER_START = StartParams().center
 _ALLOWED = "'sampled', 'paper', or (x, y, θ, q1, q2, φ)"
@@ -53,20 +58,44 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
 
 
 class StartSampler:
-    """Draws starts, uniform within the spread.
+    """Draws starts, uniform within the spread, for n episodes.
 
     Args:
         params: center and spread.
+        generators: one for each episode, looked up anew at every draw.
     """
 
-    def __init__(self, params: StartParams) -> None:
+    def __init__(self, params: StartParams, generators: Sequence[np.random.Generator]) -> None:
         self._lowest = np.array(params.center) - np.array(params.spread)
         self._width = 2.0 * np.array(params.spread)
+        self._generators = generators
+        self._drawn = np.empty((len(generators), _STARTS_PER_DRAW, 6))
+        self._used = np.full(len(generators), _STARTS_PER_DRAW)
 
-    def sample(self, generators: Sequence[np.random.Generator]) -> Array:
-        """Return a start from each generator, (k, 6)."""
-        drawn = np.array([generator.random(6) for generator in generators])
-        return self._lowest + self._width * drawn
+    def forget(self, ids: Ids) -> None:
+        """Draw anew for these episodes, whose generators have been seeded."""
+        self._used[ids] = _STARTS_PER_DRAW
+
+    def sample(self, ids: Ids) -> Array:
+        """Return the next start of each of the episodes ``ids``, (k, 6)."""
+        starts = np.empty((len(ids), 6))
+        while (spent := _take(ids, self._drawn, self._used, starts)) >= 0:
+            self._drawn[spent] = self._generators[spent].random((_STARTS_PER_DRAW, 6))
+            self._used[spent] = 0
+        return self._lowest + self._width * starts
+
+
+@compiled
+def _take(ids: Ids, drawn: Array, used: NDArray[np.int64], starts: Array) -> int:
+    """Take the next row of each episode, or return the first that has none left (else -1)."""
+    for i in ids:
+        if used[i] == drawn.shape[1]:
+            return int(i)
+    for row, i in enumerate(ids):
+        for k in range(starts.shape[1]):
+            starts[row, k] = drawn[i, used[i], k]
+        used[i] += 1
+    return -1
 
 
 def extreme_starts(params: StartParams) -> Array:

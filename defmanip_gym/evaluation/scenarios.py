@@ -46,5 +46,6 @@ def comparison_scenarios(count: int) -> tuple[Scenario, ...]:
 
 def _sampled(index: int) -> Scenario:
     seed = FIRST_EVALUATION_SEED + index
-    start = StartSampler(StartParams()).sample([np.random.default_rng(seed)])[0]
+    sampler = StartSampler(StartParams(), [np.random.default_rng(seed)])
+    start = sampler.sample(np.arange(1))[0]
     return Scenario(name=f"sampled-{index:02d}", seed=seed, start=tuple(start.tolist()))
