@@ -17,7 +17,16 @@ def test_the_script_in_the_readme_runs_and_succeeds(capsys):
     assert float(margin) > 0
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "docs/architecture.md"])
+@pytest.mark.parametrize(
+    "document",
+    [
+        "README.md",
+        "CONTRIBUTING.md",
+        "docs/architecture.md",
+        "docs/performance.md",
+        "docs/recipes.md",
+    ],
+)
 def test_links_and_named_files_exist(document):
     path = ROOT / document
     for target in re.findall(r"\]\(([^)#]+)\)", path.read_text()):
