@@ -184,8 +184,8 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Start an episode; see "Starting State" for ``options``."""
-        super().reset(seed=seed)
         observation, _ = self.engine.reset(seeds=[seed], options=options)
+        super().reset(seed=seed)
         if self.render_mode == "human":
             self.render()
         return observation[0], self.engine.single_info

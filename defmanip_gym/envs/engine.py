@@ -165,8 +165,11 @@ class TransportEngine:
 
         Raises:
             StartError: the requested start cannot be taken.
+            ResetNeeded: the first reset leaves episodes out.
         """
         ids = self._all if ids is None else ids
+        if not self._is_started and len(ids) < self.num_envs:
+            raise ResetNeeded("The first reset must start every episode.")
         requested = requested_starts(options, self.num_envs)
         if requested is not None:
             check_starts(requested[ids], self.config)
@@ -183,6 +186,10 @@ class TransportEngine:
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
         return self._scores.observations, self.info
+
+    def detach(self) -> None:
+        """Go on with a copy of the last results, whatever becomes of those handed out."""
+        self._scores = self._scores.copy()
 
     def step(self, actions: Any, *, idle: BoolArray | None = None) -> Scores:
         """Advance all episodes by one control period.

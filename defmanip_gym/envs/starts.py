@@ -40,7 +40,9 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
         return None
     unknown = set(options) - {"start"}
     if unknown:
-        raise StartError("options", sorted(unknown), "the key 'start'", f"Use start={_ALLOWED}.")
+        raise StartError(
+            "options", sorted(map(str, unknown)), "the key 'start'", f"Use start={_ALLOWED}."
+        )
     start = options.get("start", "sampled")
     if isinstance(start, str):
         if start == "sampled":

@@ -143,6 +143,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         seeds = self._seeds(seed)
         observation, info = self.engine.reset(ids, seeds=[seeds[i] for i in ids], options=options)
         self._ended[ids] = False
+        self._keep_results()
         return observation, info
 
     def step(self, actions: Array) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
@@ -162,7 +163,13 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             observation, info = self.engine.reset(np.flatnonzero(self._ended))
             info |= final
             self._ended = np.zeros(self.num_envs, dtype=bool)
+        self._keep_results()
         return observation, scores.rewards, scores.terminated, scores.truncated, info
+
+    def _keep_results(self) -> None:
+        """Keep what running episodes were told: a reset of some tells the others again."""
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            self.engine.detach()
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """Return a seed, or None, for each episode."""
@@ -187,7 +194,10 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return seeds
 
     def _masked(self, mask: Any) -> NDArray[np.intp]:
-        values = np.asarray(mask)
+        try:
+            values = np.asarray(mask)
+        except ValueError:
+            values = np.empty(0)
         if values.shape != (self.num_envs,) or values.dtype != bool or not values.any():
             raise StartError(
                 "reset_mask",

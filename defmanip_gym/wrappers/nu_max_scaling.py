@@ -243,9 +243,10 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
         """Start episodes; all, or those of ``options["reset_mask"]``."""
-        mask = (options or {}).get("reset_mask")
         observation, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
+        mask = (options or {}).get("reset_mask")
         started = np.ones(self.num_envs, dtype=bool) if mask is None else np.asarray(mask)
+        self._ended = self._ended & ~started
         self._remember(observation, started)
         return observation, info | self._report(np.zeros(self.num_envs))
 

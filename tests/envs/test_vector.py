@@ -195,6 +195,23 @@ def test_noise_of_the_next_episode_does_not_depend_on_the_reset_mode(steps):
     assert np.array_equal(observation, following.step(np.full((1, 3), np.nan))[0])
 
 
+def test_the_first_reset_must_start_every_episode():
+    with pytest.raises(ResetNeeded):
+        make(3, autoreset_mode="Disabled").reset(
+            seed=0, options={"reset_mask": np.array([True, False, True])}
+        )
+
+
+def test_running_episodes_are_told_their_last_results_again_at_a_partial_reset():
+    env = make(3, autoreset_mode="Disabled")
+    env.reset(seed=0)
+    observation, *_ = env.step(np.ones((3, 3)))
+    kept = observation.copy()
+    observation[:] = 0.0
+    again, _ = env.reset(options={"reset_mask": np.array([True, False, False])})
+    assert np.array_equal(again[1:], kept[1:])
+
+
 def test_actions_are_checked_in_every_step_of_next_step_mode():
     env = make(2, autoreset_mode="NextStep", max_episode_steps=1)
     env.reset(seed=0)
@@ -209,13 +226,13 @@ def test_bad_resets_are_refused_by_name():
     with pytest.raises(ResetNeeded):
         env.step(np.zeros((3, 3)))
     env.reset(seed=0)
-    for mask in (np.zeros(3, dtype=bool), np.ones(4, dtype=bool), [1, 0, 2]):
+    for mask in (np.zeros(3, dtype=bool), np.ones(4, dtype=bool), [1, 0, 2], [[1], 2]):
         with pytest.raises(StartError, match="booleans"):
             env.reset(options={"reset_mask": mask})
     for seed in ([1, 2], -1, 1.5, [1, 2, -3], [1, 2, "x"]):
         with pytest.raises(StartError, match="seed"):
             env.reset(seed=seed)
-    for options in ("paper", [1]):
+    for options in ("paper", [1], {1: 2, "a": 3}):
         with pytest.raises(StartError, match="options"):
             env.reset(options=options)
     with pytest.raises(ParameterError, match="autoreset_mode"):

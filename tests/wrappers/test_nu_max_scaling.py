@@ -195,3 +195,31 @@ def test_bad_actions_are_refused_by_name():
 def test_conditions_that_leave_no_room_are_refused():
     with pytest.raises(CertificateError, match="ask for less"):
         certify(BeamParams(), conditions=CertificateConditions(vertical_acceleration_m_s2=5.0))
+
+
+def test_the_ignored_step_of_next_step_mode_is_not_counted():
+    env = NuMaxVectorActionScaling(
+        gymnasium.make_vec(ENV_ID, num_envs=2, autoreset_mode="NextStep", max_episode_steps=2), L1
+    )
+    env.reset(seed=0)
+    for action in (0.2, 0.2, np.nan, 0.2):  # the third is ignored
+        env.step(np.full((2, 3), action))
+    assert env.scaling.steps == 6
+    env.step(np.full((2, 3), 0.2))  # ends the second episodes
+    env.reset(seed=1)
+    with pytest.raises(ActionError):
+        env.step(np.full((2, 3), np.nan))
+
+
+def test_what_callers_do_to_observations_does_not_reach_the_wrapper():
+    spoiled, left = batch(3), batch(3)
+    for env in (spoiled, left):
+        env.reset(seed=4)
+    for k in range(10):
+        actions = np.full((3, 3), 0.5)
+        theirs, ours = spoiled.step(actions)[0], left.step(actions)[0]
+        assert np.array_equal(theirs, ours)
+        theirs[:] = 50.0
+        if k == 5:
+            mask = {"reset_mask": np.array([True, False, False])}
+            assert np.array_equal(spoiled.reset(options=mask)[0], left.reset(options=mask)[0])
