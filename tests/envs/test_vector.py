@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
+from mujoco import batch as mujoco_batch
 
 from defmanip_gym.errors import ActionError, ParameterError, StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, TaskParams
@@ -152,6 +153,30 @@ def test_a_failed_simulation_stays_frozen_while_others_are_reset():
     env.reset(options={"reset_mask": np.array([True, False])})
     _, reward, _, _, info = env.step(np.zeros((2, 3)))
     assert info["distance_to_goal"][1] == distance and reward[1] < 0
+
+
+class Erring:
+    """A batch in which MuJoCo raises an error in one simulation."""
+
+    def __init__(self, inner, index):
+        self._inner, self._index = inner, index
+
+    def __getattr__(self, name):
+        return getattr(self._inner, name)
+
+    def rollout(self, *args, **kwargs):
+        self._inner.rollout(*args, **kwargs)
+        raise mujoco_batch.SimulationError(np.array([self._index]), "out of order")
+
+
+def test_an_error_in_mujoco_ends_only_its_own_episode():
+    env, healthy = make(3, autoreset_mode="Disabled"), make(3, autoreset_mode="Disabled")
+    env.reset(seed=0), healthy.reset(seed=0)
+    simulation = env.unwrapped.engine.simulation
+    simulation._batch = Erring(simulation._batch, 1)
+    observation, _, terminated, _, info = env.step(np.ones((3, 3)))
+    assert terminated.tolist() == info["simulation_failed"].tolist() == [False, True, False]
+    assert np.array_equal(observation[[0, 2]], healthy.step(np.ones((3, 3)))[0][[0, 2]])
 
 
 def test_absurd_velocities_count_as_failed():
