@@ -133,7 +133,8 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             options: ``start`` as in the single environment, or (n, 6) of them; ``reset_mask``.
 
         Raises:
-            StartError: bad options, or seeds of another number than n.
+            StartError: bad options or seeds.
+            ResetNeeded: the first reset leaves episodes out.
         """
         if not isinstance(options, Mapping | None):
             raise StartError("options", options, "a dict or None", "Write {'start': ...}.")
