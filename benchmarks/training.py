@@ -30,8 +30,10 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-from defmanip_gym.training.config import TrainConfig, load_hyperparameters
-from defmanip_gym.training.train import build_model, make_training_env
+from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.environments import make_training_env
+from defmanip_gym.training.hyperparameters import load_hyperparameters
+from defmanip_gym.training.model import build_model
 from environments import ENV_ID
 from throughput import table, write_json
 from turns import Figure
@@ -212,9 +214,9 @@ def _warm_up_steps(model: BaseAlgorithm) -> int:
 
 def _ours(algo: Algo, config: TrainingConfig) -> BaseAlgorithm:
     settings = TrainConfig(algo=algo)
-    hyperparameters = load_hyperparameters(None, algo) | _overrides(algo, config)
-    venv = make_training_env(settings, int(hyperparameters["n_envs"]))
-    return build_model(settings, hyperparameters, venv)
+    hyperparameters = load_hyperparameters(None, algo, settings.env_id) | _overrides(algo, config)
+    venv = make_training_env(settings, hyperparameters)
+    return build_model(algo, settings.seed, hyperparameters, venv)
 
 
 def _default(algo: Algo, config: TrainingConfig) -> BaseAlgorithm:

@@ -15,6 +15,7 @@ from defmanip_gym.errors import DefmanipError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.tune_config import TuneConfig
 
 Config = TypeVar("Config")
 
@@ -23,6 +24,7 @@ def main() -> None:
     """Entry point of ``defmanip``."""
     commands: dict[str, Callable[..., Any]] = {
         "train": TrainConfig,
+        "tune": TuneConfig,
         "compare": ComparisonConfig,
         "certify": CertifyConfig,
         "reproduce": ReproductionConfig,
@@ -61,6 +63,10 @@ def _run(config: object) -> None:
 
         folder = train(config)
         print(f"Run folder: {folder}")
+    elif isinstance(config, TuneConfig):
+        from defmanip_gym.training.tuning import run_tune
+
+        run_tune(config)
     elif isinstance(config, CertifyConfig):
         from defmanip_gym.certification.command import run_certify  # as does matplotlib
 

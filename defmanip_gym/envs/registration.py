@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import gymnasium
 
+from defmanip_gym.params import BeamParams, BeamRanges
+
 ENV_ID = "DeformTransport-v0"
+RANDOMIZED_ENV_ID = "DeformTransportRandomized-v0"
+ENV_IDS = (ENV_ID, RANDOMIZED_ENV_ID)
 MAX_EPISODE_STEPS = 1000
+
+RANDOMIZED_DAMPING = (0.05, 1.0)
+RANDOMIZED_MASS_SHARES = (0.8, 1.2)
+
+
+def randomized_ranges() -> BeamRanges:
+    """Return what the episodes of ``DeformTransportRandomized-v0`` draw: damping and mass ±20 %."""
+    low, high = RANDOMIZED_MASS_SHARES
+    mass_kg = BeamParams().mass_kg
+    return BeamRanges(damping=RANDOMIZED_DAMPING, mass_kg=(low * mass_kg, high * mass_kg))
 
 
 def register_environments() -> None:
     """Register every environment of the package; calling it again changes nothing."""
-    if ENV_ID in gymnasium.registry:
-        return
-    gymnasium.register(
-        id=ENV_ID,
-        entry_point="defmanip_gym.envs.deform_transport:DeformTransportEnv",
-        vector_entry_point="defmanip_gym.envs.vector:DeformTransportVectorEnv",
-        max_episode_steps=MAX_EPISODE_STEPS,
-    )
+    for env_id, kwargs in (
+        (ENV_ID, {}),
+        (RANDOMIZED_ENV_ID, {"beam_ranges": randomized_ranges()}),
+    ):
+        if env_id not in gymnasium.registry:
+            gymnasium.register(
+                id=env_id,
+                entry_point="defmanip_gym.envs.deform_transport:DeformTransportEnv",
+                vector_entry_point="defmanip_gym.envs.vector:DeformTransportVectorEnv",
+                max_episode_steps=MAX_EPISODE_STEPS,
+                kwargs=kwargs,
+            )

@@ -12,7 +12,7 @@ from filelock import FileLock, Timeout
 from rich.console import Console
 
 from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.baselines.learned.agents import load_agent, shipped_agents
+from defmanip_gym.baselines.learned.agents import load_agent, shipped_families
 from defmanip_gym.display import progress_bar
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.config import ComparisonConfig
@@ -102,7 +102,7 @@ def _fingerprint(
     config: ComparisonConfig, everyone: Sequence[Contestant], scenarios: Sequence[Scenario]
 ) -> str:
     """Identify whatever the records depend on; not who takes part, so that more can join."""
-    agent = SHIPPED_AGENT in shipped_agents()
+    agent = SHIPPED_AGENT in shipped_families()
     return fingerprint(
         {
             "package_version": __version__,

@@ -17,7 +17,7 @@ from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, 
 
 Array = NDArray[np.float64]
 
-SHIPPED_AGENT = "ppo-deform-transport-v0"
+SHIPPED_AGENT = "ppo"
 
 # Keeps a random policy's draws apart from those that sampled its start.
 _POLICY_SEED_OFFSET = 1_000_000_000

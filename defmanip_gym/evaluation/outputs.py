@@ -16,7 +16,7 @@ from defmanip_gym.evaluation.contestants import Contestant
 from defmanip_gym.evaluation.plots import PLOTS
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report import Figure, Setting, embedded, write_report
-from defmanip_gym.evaluation.scenarios import FIRST_EVALUATION_SEED
+from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
 from defmanip_gym.evaluation.statistics import Summary, summarize
 from defmanip_gym.evaluation.table import terminal_table, write_csv
 from defmanip_gym.evaluation.traces import Trace, load_trace, trace_path

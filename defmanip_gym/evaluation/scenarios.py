@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from defmanip_gym.envs.starts import PAPER_START, StartSampler
+from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
 from defmanip_gym.params import StartParams
 from defmanip_gym.validation import require_whole
-
-# Training draws its seeds below this one, so no agent has trained on a start of a comparison.
-FIRST_EVALUATION_SEED = 1_000_000
 
 PAPER_SCENARIO = "paper"
 

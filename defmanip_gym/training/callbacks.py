@@ -3,8 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol, runtime_checkable
 
 from stable_baselines3.common.callbacks import BaseCallback
+
+
+@runtime_checkable
+class Resumable(Protocol):
+    """A callback with numbers that an interrupted run must not lose."""
+
+    def state(self) -> dict[str, float]:
+        """Return what a checkpoint keeps."""
+        ...
+
+    def set_state(self, state: dict[str, float]) -> None:
+        """Go on from what ``state`` returned."""
+        ...
 
 
 class Periodically(BaseCallback):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
 from defmanip_gym.errors import RunFolderError
+from defmanip_gym.training.callbacks import Resumable
 
 _MODEL, _NORMALIZATION, _STATE, _REPLAY = (
     "model.zip",
@@ -30,8 +32,10 @@ def observation_statistics(venv: VecNormalize) -> RunningMeanStd:
     return statistics
 
 
-def write_checkpoint(folder: Path, model: BaseAlgorithm, venv: VecNormalize) -> None:
-    """Write networks, optimizers, normalization, counters and the replay buffer."""
+def write_checkpoint(
+    folder: Path, model: BaseAlgorithm, venv: VecNormalize, callbacks: Sequence[Resumable] = ()
+) -> None:
+    """Write networks, optimizers, normalization, counters, callbacks and the replay buffer."""
     model.save(folder / _MODEL)
     observation = observation_statistics(venv)
     np.savez(
@@ -43,7 +47,11 @@ def write_checkpoint(folder: Path, model: BaseAlgorithm, venv: VecNormalize) -> 
         ret_var=venv.ret_rms.var,
         ret_count=venv.ret_rms.count,
     )
-    state = {"num_timesteps": model.num_timesteps, "n_updates": model._n_updates}
+    state: dict[str, Any] = {
+        "num_timesteps": model.num_timesteps,
+        "n_updates": model._n_updates,
+        "callbacks": [callback.state() for callback in callbacks],
+    }
     if isinstance(model, OffPolicyAlgorithm):
         buffer: Any = model.replay_buffer
         filled = buffer.buffer_size if buffer.full else buffer.pos
@@ -53,7 +61,9 @@ def write_checkpoint(folder: Path, model: BaseAlgorithm, venv: VecNormalize) -> 
     (folder / _STATE).write_text(json.dumps(state))
 
 
-def read_checkpoint(folder: Path, model: BaseAlgorithm, venv: VecNormalize) -> None:
+def read_checkpoint(
+    folder: Path, model: BaseAlgorithm, venv: VecNormalize, callbacks: Sequence[Resumable] = ()
+) -> None:
     """Put a checkpoint into a model and normalization built from the same configuration.
 
     Raises:
@@ -73,6 +83,8 @@ def read_checkpoint(folder: Path, model: BaseAlgorithm, venv: VecNormalize) -> N
         state = json.loads((folder / _STATE).read_text())
         model.num_timesteps = int(state["num_timesteps"])
         model._n_updates = int(state["n_updates"])
+        for callback, numbers in zip(callbacks, state["callbacks"], strict=True):
+            callback.set_state(numbers)
         if isinstance(model, OffPolicyAlgorithm):
             buffer: Any = model.replay_buffer
             with np.load(folder / _REPLAY, allow_pickle=False) as arrays:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, get_args
 
-import yaml
-
-from defmanip_gym.envs.registration import ENV_ID
+from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.errors import ParameterError
-from defmanip_gym.evaluation.scenarios import FIRST_EVALUATION_SEED
+from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
 from defmanip_gym.validation import require_choice, require_non_negative, require_whole
 
-Algorithm = Literal["ppo", "sac", "td3"]
+Recipe = Literal["ppo", "sac", "tqc", "residual", "lagrangian"]
 
-HYPERPARAMETERS = Path(__file__).parents[1] / "baselines" / "learned" / "hyperparams"
+# what learns in each recipe
+ALGORITHM_OF = {"ppo": "ppo", "sac": "sac", "tqc": "tqc", "residual": "ppo", "lagrangian": "ppo"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,16 +24,21 @@ class TrainConfig:
     Examples:
         python train.py --algo ppo --total-timesteps 3000000 --seed 0
 
+        python train.py --algo residual --seed 3
+
+        python train.py --algo ppo --env DeformTransportRandomized-v0
+
         python train.py --algo sac --certificate l1
 
         python train.py --resume runs/DeformTransport-v0-ppo-seed0
     """
 
-    algo: Algorithm = "ppo"
-    """Learning algorithm."""
+    algo: Recipe = "ppo"
+    """Learning algorithm; residual (PPO that corrects the paper's controller inside a certificate)
+    and lagrangian (PPO with an adapting price on violations) are among them."""
 
     env: str = ENV_ID
-    """Environment id."""
+    """Environment id; DeformTransportRandomized-v0 draws every episode's damping and mass."""
 
     total_timesteps: int | None = None
     """Environment steps; the hyperparameter file's n_timesteps by default."""
@@ -42,8 +46,9 @@ class TrainConfig:
     seed: int = 0
     """Seed of networks, exploration and starts, below 1,000,000."""
 
-    certificate: Literal["l1", "tanner"] | None = None
-    """Train inside NuMaxActionScaling with this certificate for the true beam."""
+    certificate: Literal["l1", "phase_plane", "tanner"] | None = None
+    """Train inside NuMaxActionScaling with this certificate for the true beam; residual has its
+    own."""
 
     resume: Path | None = None
     """Run folder to continue; every other option but --total-timesteps is taken from it."""
@@ -60,14 +65,25 @@ class TrainConfig:
     evaluation_episodes: int = 32
     """Episodes per evaluation."""
 
+    num_threads: int = 0
+    """Threads for physics, 0 for one per CPU; 1 is best where several runs share a machine."""
+
     def __post_init__(self) -> None:
-        require_choice("algo", self.algo, ("ppo", "sac", "td3"))
-        require_choice("env", self.env, (ENV_ID, f"defmanip_gym:{ENV_ID}"))
+        require_choice("algo", self.algo, get_args(Recipe))
+        require_choice("env", self.env, (*ENV_IDS, *(f"defmanip_gym:{id_}" for id_ in ENV_IDS)))
+        if self.algo == "residual" and self.certificate is not None:
+            raise ParameterError(
+                "certificate",
+                self.certificate,
+                "none with --algo residual",
+                "Its hyperparameter file names the certificate.",
+            )
         if self.total_timesteps is not None:
             require_whole("total_timesteps", self.total_timesteps, 1)
         require_non_negative("seed", self.seed)
         require_whole("evaluations", self.evaluations, 1)
         require_whole("evaluation_episodes", self.evaluation_episodes, 1)
+        require_whole("num_threads", self.num_threads, 0)
         if self.seed >= FIRST_EVALUATION_SEED:
             raise ParameterError(
                 "seed",
@@ -76,39 +92,7 @@ class TrainConfig:
                 "Seeds above are kept for evaluation.",
             )
 
-
-def load_hyperparameters(path: Path | None, algo: Algorithm) -> dict[str, Any]:
-    """Return the hyperparameters of ``DeformTransport-v0`` in an rl-zoo3 YAML file.
-
-    Raises:
-        ParameterError: the file is missing, not YAML, or has no entry for the environment.
-    """
-    path = path or HYPERPARAMETERS / f"{algo}.yml"
-    try:
-        content = yaml.safe_load(path.read_text())
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ParameterError(
-            "hyperparameters", str(path), "a readable YAML file", f"{error}"
-        ) from error
-    if not isinstance(content, dict) or not isinstance(content.get(ENV_ID), dict):
-        raise ParameterError(
-            "hyperparameters", str(path), f"a mapping with the key {ENV_ID}", "See the package's."
-        )
-    return checked_hyperparameters(content[ENV_ID], str(path))
-
-
-def checked_hyperparameters(hyperparameters: dict[str, Any], source: str) -> dict[str, Any]:
-    """Return hyperparameters that have what training needs.
-
-    Raises:
-        ParameterError: an entry is missing.
-    """
-    missing = {"n_envs", "n_timesteps", "policy", "learning_rate"} - set(hyperparameters)
-    if missing:
-        raise ParameterError(
-            "hyperparameters",
-            source,
-            "n_envs, n_timesteps, policy, learning_rate and the algorithm's own",
-            f"It lacks {', '.join(sorted(missing))}.",
-        )
-    return dict(hyperparameters)
+    @property
+    def env_id(self) -> str:
+        """The environment id without a module to import."""
+        return self.env.split(":")[-1]

@@ -8,8 +8,13 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import nn
 
-from defmanip_gym.baselines.learned.actor import AgentCard, MlpActor
+from defmanip_gym.baselines.learned.actor import MlpActor
+from defmanip_gym.baselines.learned.card import AgentCard
+from defmanip_gym.baselines.residual_action import ResidualAction
 from defmanip_gym.errors import AgentFileError
+from defmanip_gym.params import BeamParams, TaskParams
+from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.training.hyperparameters import components
 
 _ACTIVATION_NAMES = {nn.Tanh: "tanh", nn.ReLU: "relu"}
 
@@ -18,17 +23,19 @@ def actor_modules(model: BaseAlgorithm) -> tuple[list[nn.Module], bool]:
     """Return the layers of a model's deterministic actor and whether tanh squashes its output.
 
     Raises:
-        AgentFileError: an algorithm other than PPO, SAC and TD3.
+        AgentFileError: an algorithm other than PPO, SAC, TQC and TD3.
     """
     policy: Any = model.policy
     name = type(model).__name__
     if name == "PPO":
         return [*policy.mlp_extractor.policy_net, policy.action_net], False
-    if name == "SAC":
+    if name in ("SAC", "TQC"):
         return [*policy.actor.latent_pi, policy.actor.mu], True
     if name == "TD3":
         return [*policy.actor.mu][:-1], True
-    raise AgentFileError("algorithm", name, "PPO, SAC or TD3", "Export knows these actors only.")
+    raise AgentFileError(
+        "algorithm", name, "PPO, SAC, TQC or TD3", "Export knows these actors only."
+    )
 
 
 def hidden_activation(model: BaseAlgorithm) -> str:
@@ -43,6 +50,16 @@ def hidden_activation(model: BaseAlgorithm) -> str:
     if len(names) != 1 or not names <= set(_ACTIVATION_NAMES.values()):
         raise AgentFileError("activation", sorted(names), "tanh or relu", "Train with one of them.")
     return names.pop()
+
+
+def residual_of(hyperparameters: dict[str, Any]) -> tuple[str | None, float | None]:
+    """Return certificate and authority in m/s² of a residual policy, (None, None) of another."""
+    for wrapper, options in components(hyperparameters, "env_wrapper"):
+        if wrapper is ResidualAction:
+            method = options.get("certificate", "phase_plane")
+            bound = certify(BeamParams(), method=method, conditions=TRANSPORT_CONDITIONS)
+            return method, min(bound.acceleration_bound, TaskParams().max_acceleration_m_s2)
+    return None, None
 
 
 def to_actor(model: BaseAlgorithm, card: AgentCard, normalization: RunningMeanStd) -> MlpActor:

@@ -23,8 +23,9 @@ class Sb3VecEnv(VecEnv):
 
     The info dict of an episode that ends holds what SB3 reads (``terminal_observation``,
     ``TimeLimit.truncated``, and ``episode`` with return, length and cost) and the environment's
-    own info of its last step; those of the others are empty. ``step_info`` holds the info of all
-    episodes as arrays. Episode statistics are kept here: no ``VecMonitor`` is needed.
+    own info of its last step; those of the others hold ``cost`` where it is not zero. ``step_info``
+    holds the info of all episodes as arrays. Episode statistics are kept here: no ``VecMonitor`` is
+    needed.
 
     Args:
         env: the package's batched environment, with its vector wrappers if any.
@@ -91,6 +92,8 @@ class Sb3VecEnv(VecEnv):
         self.step_info = info
         self._returns += reward
         self._lengths += 1
+        for i in np.flatnonzero(info["cost"]):
+            infos[i]["cost"] = float(info["cost"][i])
         ids = np.flatnonzero(ended)
         if len(ids):
             last = info["final_info"]

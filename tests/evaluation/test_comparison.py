@@ -167,7 +167,7 @@ def test_a_second_comparison_in_the_same_folder_is_refused(tmp_path):
 
 
 def test_agents_of_one_folder_name_stay_apart_and_new_weights_are_run_anew(tmp_path):
-    shipped = load_agent("ppo-deform-transport-v0")
+    shipped = load_agent("ppo")
     folders = [tmp_path / parent / "run" for parent in ("a", "b")]
     for number, folder in enumerate(folders):
         changed = replace(shipped.card, seed=number)

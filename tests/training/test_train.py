@@ -7,26 +7,29 @@ import gymnasium
 import numpy as np
 import pytest
 import yaml
-from safetensors.numpy import load_file, save_file
 from stable_baselines3.common.callbacks import BaseCallback
 
 from defmanip_gym.baselines.learned.agents import load_agent
-from defmanip_gym.envs.registration import ENV_ID
+from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
 from defmanip_gym.errors import AgentFileError, ParameterError, RunFolderError
 from defmanip_gym.training import train as training
-from defmanip_gym.training.config import TrainConfig, load_hyperparameters
+from defmanip_gym.training.config import ALGORITHM_OF, TrainConfig
+from defmanip_gym.training.environments import make_training_env
+from defmanip_gym.training.hyperparameters import load_hyperparameters
+from defmanip_gym.training.model import build_model
 
+OFF_POLICY = {"n_envs": 4, "learning_starts": 50, "gradient_steps": 1, "buffer_size": 1000}
 SMALL = {
     "ppo": {"n_envs": 4, "n_steps": 32, "batch_size": 64, "n_epochs": 1},
-    "sac": {"n_envs": 4, "learning_starts": 50, "gradient_steps": 1, "buffer_size": 1000},
-    "td3": {"n_envs": 4, "learning_starts": 50, "gradient_steps": 1, "buffer_size": 1000},
+    "sac": OFF_POLICY,
+    "tqc": OFF_POLICY,
 }
 
 
 @pytest.fixture
 def config(tmp_path):
     def make(algo="ppo", **changes):
-        hyperparameters = load_hyperparameters(None, algo) | SMALL[algo]
+        hyperparameters = load_hyperparameters(None, algo, ENV_ID) | SMALL[ALGORITHM_OF[algo]]
         path = tmp_path / f"{algo}.yml"
         path.write_text(yaml.safe_dump({ENV_ID: hyperparameters}))
         defaults = dict(
@@ -42,17 +45,21 @@ def config(tmp_path):
     return make
 
 
+def resumable(hyperparameters):
+    return [c for c in training.callbacks_of(hyperparameters) if isinstance(c, training.Resumable)]
+
+
 def sb3_actions(folder, config, observations):
     """The actions of the run's last SB3 model, normalized as in training."""
-    venv = training.make_training_env(config, 4)
-    model = training.build_model(
-        config, load_hyperparameters(config.hyperparameters, config.algo), venv
-    )
-    training.read_checkpoint(training.RunFolder(folder).last_checkpoint(), model, venv)
+    hyperparameters = load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
+    venv = make_training_env(config, hyperparameters)
+    model = build_model(config.algo, config.seed, hyperparameters, venv)
+    checkpoint = training.RunFolder(folder).last_checkpoint()
+    training.read_checkpoint(checkpoint, model, venv, resumable(hyperparameters))
     return model.predict(venv.normalize_obs(observations), deterministic=True)[0]
 
 
-@pytest.mark.parametrize("algo", ["ppo", "sac", "td3"])
+@pytest.mark.parametrize("algo", ["ppo", "sac", "tqc", "residual", "lagrangian"])
 def test_exported_agent_acts_as_the_trained_model(algo, config):
     settings = config(algo)
     folder = training.train(settings)
@@ -108,6 +115,53 @@ def test_interrupted_run_keeps_its_state_and_says_how_to_go_on(config, monkeypat
     assert load_agent(folder).card.total_timesteps == 512
 
 
+def test_price_of_violations_survives_an_interruption(config):
+    folder = training.train(config("lagrangian"))
+    state = training.RunFolder(folder).last_checkpoint() / "state.json"
+    content = json.loads(state.read_text())
+    content["callbacks"] = [{"multiplier": 2.5}]
+    state.write_text(json.dumps(content))
+    training.train(TrainConfig(resume=folder, total_timesteps=640))
+    again = training.RunFolder(folder).last_checkpoint() / "state.json"
+    (numbers,) = json.loads(again.read_text())["callbacks"]
+    assert numbers["multiplier"] == pytest.approx(2.5, abs=0.1)
+
+
+def test_randomized_beams_train_under_their_own_name(config, tmp_path):
+    settings = config()
+    content = yaml.safe_load(settings.hyperparameters.read_text())
+    settings.hyperparameters.write_text(yaml.safe_dump({RANDOMIZED_ENV_ID: content[ENV_ID]}))
+    folder = training.train(replace(settings, env=f"defmanip_gym:{RANDOMIZED_ENV_ID}"))
+    assert load_agent(folder).card.env_id == RANDOMIZED_ENV_ID
+    assert RANDOMIZED_ENV_ID in folder.name
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"env_wrapper": "gymnasium.wrappers.ClipAction"}, "vector_wrapper"),
+        ({"env_wrapper": "no.such.Wrapper"}, "imported"),
+        ({"env_wrapper": [{"two": {}, "keys": {}}]}, "indentation"),
+        ({"env_kwargs": {"colour": "red"}}, "colour"),
+        ({"n_envs": 0}, "n_envs"),
+        ({"colour": "red"}, "colour"),
+        ({"batch_size": -3}, "batch_size"),
+    ],
+)
+def test_hyperparameters_that_cannot_be_used_are_refused_by_name(change, named, config):
+    settings = config()
+    content = yaml.safe_load(settings.hyperparameters.read_text())
+    content[ENV_ID] |= change
+    settings.hyperparameters.write_text(yaml.safe_dump(content))
+    with pytest.raises(ParameterError, match=named):
+        training.train(settings)
+
+
+def test_residual_learns_in_its_own_certificate_only():
+    with pytest.raises(ParameterError, match="certificate"):
+        TrainConfig(algo="residual", certificate="l1")
+
+
 def test_one_seed_trains_one_agent(config):
     first, second = (load_agent(training.train(config())) for _ in range(2))
     observation = np.linspace(-1, 1, first.observation_size)
@@ -152,42 +206,6 @@ def test_damaged_checkpoint_is_refused_by_name(config):
     (checkpoint / "model.zip").write_bytes(b"nonsense")
     with pytest.raises(RunFolderError, match="checkpoint"):
         training.train(TrainConfig(resume=folder, total_timesteps=1024))
-
-
-def rewritten(folder, **changes):
-    """Overwrite tensors of an agent and return its folder."""
-    path = folder / "agent.safetensors"
-    tensors = load_file(path) | changes
-    save_file({name: value for name, value in tensors.items() if value is not None}, path)
-    return folder
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"layers.0.weight": np.full((64, 22), np.nan, np.float32)},
-        {"layers.0.weight": np.zeros((64, 21), np.float32)},
-        {"observation.variance": -np.ones(22)},
-        {"layers.2.weight": None, "layers.2.bias": None},
-    ],
-    ids=["not finite", "another size", "negative variance", "a layer short"],
-)
-def test_agents_with_impossible_tensors_are_refused(changes, config):
-    folder = training.train(config(total_timesteps=128))
-    load_agent(folder)
-    with pytest.raises(AgentFileError, match="agent"):
-        load_agent(rewritten(folder, **changes))
-
-
-@pytest.mark.parametrize(
-    "field", [{"activation": ["tanh"]}, {"action_size": "3"}, {"env_id": "CartPole-v1"}]
-)
-def test_cards_with_impossible_fields_are_refused(field, config):
-    folder = training.train(config(total_timesteps=128))
-    card = folder / "agent.json"
-    card.write_text(json.dumps(json.loads(card.read_text()) | field))
-    with pytest.raises(AgentFileError):
-        load_agent(folder)
 
 
 def test_incomplete_configurations_are_refused_and_leave_nothing(config, tmp_path):

@@ -1,51 +1,123 @@
-"""Finding agents: shipped ones by name, others by path."""
+"""Finding agents, shipped ones by name and others by path, and making controllers of them."""
 
 from __future__ import annotations
 
+import os
 import zipfile
 from pathlib import Path
 
-from defmanip_gym.baselines.learned.actor import (
-    CARD_SUFFIX,
-    TENSOR_SUFFIX,
-    MlpActor,
-    load_actor,
+from defmanip_gym.baselines.controller import Controller
+from defmanip_gym.baselines.learned.actor import CARD_SUFFIX, TENSOR_SUFFIX, MlpActor, load_actor
+from defmanip_gym.baselines.learned.families import (
+    SHIPPED,
+    load_family,
+    load_member,
+    shipped_families,
 )
+from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
+from defmanip_gym.baselines.residual import ResidualController
+from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.errors import AgentFileError
+from defmanip_gym.params import BeamParams, TaskParams
+from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 
-_SHIPPED = Path(__file__).parent / "shipped"
+__all__ = [
+    "RUN_AGENT",
+    "controller_of",
+    "is_sb3_zip",
+    "load_agent",
+    "load_controller",
+    "load_family",
+    "shipped_families",
+]
+
 RUN_AGENT = "agent"  # name of the exported agent in a run folder
 
 
-def shipped_agents() -> tuple[str, ...]:
-    """Return the names of the agents that come with the package."""
-    return tuple(sorted(path.stem for path in _SHIPPED.glob(f"*{TENSOR_SUFFIX}")))
-
-
-def load_agent(name: str | Path) -> MlpActor:
+def load_agent(name: str | Path, library: Path = SHIPPED) -> MlpActor:
     """Load a shipped agent by name, or any by its run folder, tensor file or card.
+
+    ``"ppo/seed-3"`` is that member of a shipped family and ``"ppo"`` the one of the lowest seed:
+    the best of several would promise more than another training keeps. A shipped name goes before
+    a file of that name. SB3's zip files are refused, see :func:`load_controller`.
+
+    Args:
+        name: name or path.
+        library: folder of families, the package's own by default.
 
     Raises:
         AgentFileError: nothing there, or not an agent of this package.
     """
-    if str(name) in shipped_agents():
-        return load_actor(_SHIPPED / str(name))
+    text = name.as_posix() if isinstance(name, Path) else name
+    family, _, member = text.partition("/")
+    families = shipped_families(library)
+    if family in families:
+        return load_member(family, member or None, library)
     path = Path(name)
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path's method this answers whatever the name
         return load_actor(path / RUN_AGENT)
-    if path.is_file() and zipfile.is_zipfile(path):
+    if is_sb3_zip(path):
         raise AgentFileError(
             "agent",
             str(path),
             "a run folder or a .safetensors file",
-            "SB3 zip files run code when they are loaded, so they are not. Use the run folder "
-            "that train.py made, or pass a model you loaded yourself: SB3 models are controllers.",
+            "SB3's zip files run code of whoever made them when they are loaded. If you trust "
+            "them, pass --allow-pickle to evaluate.py (allow_pickle=True to load_controller). "
+            "train.py's run folders hold agents without code.",
         )
-    if path.suffix in (TENSOR_SUFFIX, CARD_SUFFIX):
-        return load_actor(path.with_suffix(""))
+    for suffix in (TENSOR_SUFFIX, CARD_SUFFIX):
+        if path.name.endswith(suffix):
+            return load_actor(path.with_name(path.name.removesuffix(suffix)))
     raise AgentFileError(
         "agent",
         str(name),
-        f"a run folder, a .safetensors file, or a shipped agent: {', '.join(shipped_agents())}",
+        f"a run folder, a .safetensors file, or a shipped agent: {', '.join(families)}",
         "Check the name or path.",
     )
+
+
+def load_controller(name: str | Path, *, allow_pickle: bool = False) -> Controller:
+    """Load an agent as the controller it stands for.
+
+    Args:
+        name: as for :func:`load_agent`.
+        allow_pickle: take SB3's zip files, too, which run whatever code their maker put in.
+
+    Raises:
+        AgentFileError: nothing there, not an agent, or a zip file that is not allowed.
+    """
+    path = Path(name)
+    if allow_pickle and is_sb3_zip(path):
+        return load_sb3_zip(path)
+    return controller_of(load_agent(name))
+
+
+def is_sb3_zip(path: Path) -> bool:
+    """Whether a path is a zip file, which only SB3 could load."""
+    return os.path.isfile(path) and zipfile.is_zipfile(path)
+
+
+def controller_of(
+    actor: MlpActor, *, certificate: Certificate | None = None
+) -> MlpActor | ResidualController:
+    """Return the controller that an agent stands for.
+
+    That is the network itself, or, of a residual agent, the paper's controller plus the network's
+    correction.
+
+    Args:
+        actor: the agent.
+        certificate: what the paper's controller under a residual keeps to; by default the one of
+            the training, computed anew for the reference beam.
+    """
+    card = actor.card
+    if card.residual_authority_m_s2 is None:
+        return actor
+    if certificate is None:
+        assert card.certificate is not None  # the card's own check
+        certificate = certify(
+            BeamParams(), method=card.certificate, conditions=TRANSPORT_CONDITIONS
+        )
+    base: Controller = TannerController(certificate=certificate)
+    authority = card.residual_authority_m_s2 / TaskParams().max_acceleration_m_s2
+    return ResidualController(base, actor, authority=authority)

@@ -1,0 +1,85 @@
+"""The environments of a training run: batched, wrapped as the hyperparameters say, normalized."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+from stable_baselines3.common.vec_env import VecNormalize
+
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.evaluation.seeds import LARGEST_BATCH, VALIDATION_SEED, training_seed
+from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.hyperparameters import components
+from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
+from defmanip_gym.validation import require_between, require_whole
+from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling, transport_config
+
+_EVALUATION_BATCH = 32
+
+
+def make_training_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> VecNormalize:
+    """Return the normalized SB3 face of the batched environment, seeded.
+
+    Raises:
+        ParameterError: wrappers or arguments that cannot be used.
+    """
+    count = hyperparameters["n_envs"]
+    require_whole("n_envs", count, 1)
+    require_between("n_envs", count, 0, LARGEST_BATCH)
+    venv = VecNormalize(_sb3_env(config, hyperparameters, count), norm_reward=True)
+    venv.gamma = float(hyperparameters.get("gamma", 0.99))
+    # a seed of its own for every episode generator of every run
+    venv.seed(training_seed(config.seed))
+    return venv
+
+
+def make_evaluation_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> VecNormalize:
+    """Return an environment of its own, normalized as the training's is at each evaluation."""
+    count = min(config.evaluation_episodes, _EVALUATION_BATCH)
+    env = VecNormalize(
+        _sb3_env(config, hyperparameters, count), training=False, norm_reward=False
+    )
+    env.seed(VALIDATION_SEED)
+    return env
+
+
+def _sb3_env(config: TrainConfig, hyperparameters: dict[str, Any], num_envs: int) -> Sb3VecEnv:
+    env_id, arguments = config.env_id, hyperparameters.get("env_kwargs") or {}
+    try:
+        env: gymnasium.vector.VectorEnv[Any, Any, Any] = gymnasium.make_vec(
+            f"defmanip_gym:{env_id}",
+            num_envs=num_envs,
+            num_threads=config.num_threads,
+            **arguments,
+        )
+    except TypeError as error:
+        raise ParameterError(
+            "env_kwargs", arguments, f"arguments of {env_id}", f"{error}."
+        ) from error
+    for wrapper, options in components(hyperparameters, "env_wrapper"):
+        env = _batched(wrapper)(env, **options)
+    if config.certificate is not None:
+        transport = transport_config(env)
+        certificate = certify(
+            transport.beam,
+            sigma_rad=transport.sigma_rad,
+            method=config.certificate,
+            conditions=TRANSPORT_CONDITIONS,
+        )
+        env = NuMaxVectorActionScaling(env, certificate)
+    return Sb3VecEnv(env)
+
+
+def _batched(wrapper: Any) -> Any:
+    """Return the batched counterpart that a wrapper of single environments names."""
+    counterpart = getattr(wrapper, "vector_wrapper", None)
+    if counterpart is None:
+        raise ParameterError(
+            "env_wrapper",
+            wrapper,
+            "a wrapper whose attribute vector_wrapper is its counterpart for batches",
+            "Training runs on a batch; rl_zoo3 also takes other wrappers.",
+        )
+    return counterpart

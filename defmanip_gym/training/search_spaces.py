@@ -1,0 +1,58 @@
+"""What a study may vary in each recipe; everything else stays as in its hyperparameter file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from optuna import Trial
+
+Overrides = dict[str, Any]
+
+
+def on_policy(trial: Trial) -> Overrides:
+    """Return PPO's changes."""
+    rate = trial.suggest_float("learning_rate", 3e-4, 3e-3, log=True)
+    return {
+        "gamma": 1.0 - trial.suggest_float("one_minus_gamma", 5e-3, 8e-2, log=True),
+        "learning_rate": f"lin_{rate:.3g}",
+        "n_steps": trial.suggest_categorical("n_steps", [16, 32, 64]),
+        "n_epochs": trial.suggest_int("n_epochs", 4, 12, step=4),
+        "clip_range": trial.suggest_categorical("clip_range", [0.1, 0.2, 0.3]),
+        "policy_kwargs": {
+            "net_arch": [64, 64],
+            "log_std_init": trial.suggest_float("log_std_init", -1.5, 0.0),
+        },
+    }
+
+
+def off_policy(trial: Trial) -> Overrides:
+    """Return changes for algorithms that learn from a replay buffer."""
+    rate = trial.suggest_float("learning_rate", 3e-4, 3e-3, log=True)
+    return {
+        "gamma": 1.0 - trial.suggest_float("one_minus_gamma", 5e-3, 8e-2, log=True),
+        "learning_rate": f"lin_{rate:.3g}",
+        "tau": trial.suggest_categorical("tau", [0.005, 0.01, 0.02]),
+        "batch_size": trial.suggest_categorical("batch_size", [256, 512, 1024]),
+        "gradient_steps": trial.suggest_categorical("gradient_steps", [2, 4, 8]),
+    }
+
+
+def lagrangian(trial: Trial) -> Overrides:
+    """Return PPO's changes and those of the dual ascent."""
+    path = "defmanip_gym.training.lagrangian.LagrangianPenalty"
+    options = {
+        "cost_limit": 0.0,
+        "multiplier": trial.suggest_float("multiplier", 0.01, 1.0, log=True),
+        "learning_rate": trial.suggest_float("multiplier_rate", 1e-3, 1e-1, log=True),
+    }
+    return on_policy(trial) | {"callback": [{path: options}]}
+
+
+SEARCH_SPACES: dict[str, Callable[[Trial], Overrides]] = {
+    "ppo": on_policy,
+    "residual": on_policy,
+    "lagrangian": lagrangian,
+    "sac": off_policy,
+    "tqc": off_policy,
+}

@@ -1,0 +1,83 @@
+"""What one study is made of; the fields are the options of ``defmanip tune``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import get_args
+
+from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
+from defmanip_gym.training.config import Recipe, TrainConfig
+from defmanip_gym.validation import require_choice, require_non_negative, require_whole
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuneConfig:
+    """Search for better hyperparameters with Optuna; a second run goes on with the study.
+
+    A trial trains for --timesteps steps and is scored on starts that neither training nor any suite
+    uses: the mean over episodes of the share of time left when the goal was reached, 0 if it was
+    not.
+
+    Examples:
+        defmanip tune --algo ppo --trials 20
+
+        defmanip tune --algo sac --trials 10 --timesteps 200000 --output runs/tuning
+    """
+
+    algo: Recipe = "ppo"
+    """Recipe whose hyperparameters are varied."""
+
+    env: str = ENV_ID
+    """Environment id."""
+
+    trials: int = 20
+    """Trials that the study has in the end, those of earlier runs included."""
+
+    timesteps: int = 500_000
+    """Environment steps of a trial."""
+
+    evaluations: int = 4
+    """Evaluations in a trial; after each, trials worse than the median are given up."""
+
+    evaluation_episodes: int = 64
+    """Episodes per evaluation."""
+
+    seed: int = 0
+    """Of the search and of every trial's training."""
+
+    output: Path = Path("runs/tuning")
+    """Folder in which study folders are made."""
+
+    num_threads: int = 0
+    """Threads for physics, 0 for one per CPU."""
+
+    def __post_init__(self) -> None:
+        require_choice("algo", self.algo, get_args(Recipe))
+        require_choice("env", self.env, ENV_IDS)
+        require_non_negative("seed", self.seed)
+        for name in ("trials", "timesteps", "evaluations", "evaluation_episodes"):
+            require_whole(name, getattr(self, name), 1)
+
+    @property
+    def training(self) -> TrainConfig:
+        """How a trial trains."""
+        return TrainConfig(
+            algo=self.algo,
+            env=self.env,
+            seed=self.seed,
+            total_timesteps=self.timesteps,
+            evaluations=self.evaluations,
+            evaluation_episodes=self.evaluation_episodes,
+            num_threads=self.num_threads,
+        )
+
+    @property
+    def command(self) -> str:
+        """The shell command that makes this study."""
+        words = ["defmanip tune"]
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value != field.default and field.name != "num_threads":
+                words.append(f"--{field.name.replace('_', '-')} {value}")
+        return " ".join(words)

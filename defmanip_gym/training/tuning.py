@@ -1,0 +1,163 @@
+"""Search for hyperparameters with Optuna: ``defmanip tune``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import optuna
+import torch
+from filelock import FileLock, Timeout
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
+from rich.console import Console
+from stable_baselines3.common.callbacks import EvalCallback
+
+from defmanip_gym.errors import RunFolderError
+from defmanip_gym.files import write_atomically
+from defmanip_gym.training.environments import make_evaluation_env, make_training_env
+from defmanip_gym.training.hyperparameters import load_hyperparameters
+from defmanip_gym.training.model import build_model, callbacks_of
+from defmanip_gym.training.search_spaces import SEARCH_SPACES
+from defmanip_gym.training.tune_config import TuneConfig
+
+STUDY_FILE, TABLE_FILE = "study.log", "trials.md"
+
+
+def run_tune(config: TuneConfig) -> Path:
+    """Run what is missing of a study, write its table, and return the table's path.
+
+    Ctrl-C keeps the finished trials and exits with 130 after saying how to go on.
+
+    Raises:
+        ParameterError: hyperparameters that cannot be used.
+        RunFolderError: the output folder cannot be used, or another study writes to it.
+    """
+    console = Console()
+    torch.set_num_threads(1)
+    folder = config.output / f"{config.env}-{config.algo}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / ".lock", timeout=0):
+            study = _study(config, folder)
+            table = folder / TABLE_FILE
+            _run_missing(config, study, console)
+            write_atomically(table, study_table(study, config).encode())
+    except Timeout as error:
+        raise RunFolderError(
+            "output", str(folder), "a folder that no other study writes to", "Wait."
+        ) from error
+    except OSError as error:
+        raise RunFolderError("output", str(folder), "a writable folder", f"{error}.") from error
+    except KeyboardInterrupt:
+        console.print(f"Stopped; {folder} keeps finished trials. Go on with the same command.")
+        raise SystemExit(130) from None
+    console.print(f"Best: {study.best_params} ({study.best_value:.3f})\nTable: {table}")
+    return table
+
+
+class _Watch(EvalCallback):
+    """Scores the model at intervals and gives hopeless trials up."""
+
+    def __init__(self, trial: optuna.Trial, config: TuneConfig, env: Any, interval: int) -> None:
+        super().__init__(
+            env,
+            n_eval_episodes=config.evaluation_episodes,
+            eval_freq=interval,
+            verbose=0,
+            warn=False,
+        )
+        self.trial, self.score, self.pruned = trial, 0.0, False
+        self._lengths: list[int] = []
+
+    def _log_success_callback(self, locals_: dict[str, Any], globals_: dict[str, Any]) -> None:
+        super()._log_success_callback(locals_, globals_)
+        if locals_["done"]:
+            self._lengths.append(int(locals_["info"]["episode"]["l"]))
+
+    def _on_step(self) -> bool:
+        due = self.n_calls % self.eval_freq == 0
+        self._lengths = [] if due else self._lengths
+        if not super()._on_step():
+            return False
+        if due:
+            successes = np.array(self._is_success_buffer, dtype=bool)
+            limit = self.eval_env.get_attr("max_episode_steps")[0]
+            left = 1.0 - np.array(self._lengths[: len(successes)]) / limit
+            self.score = float((successes * left).mean())
+            self.trial.report(self.score, self.num_timesteps)
+            self.pruned = self.trial.should_prune()
+        return not self.pruned
+
+
+def _study(config: TuneConfig, folder: Path) -> optuna.Study:
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    return optuna.create_study(
+        study_name=config.algo,
+        storage=JournalStorage(JournalFileBackend(str(folder / STUDY_FILE))),
+        sampler=optuna.samplers.TPESampler(seed=config.seed, n_startup_trials=5),
+        pruner=optuna.pruners.MedianPruner(
+            n_startup_trials=4, n_warmup_steps=config.timesteps // 3
+        ),
+        direction="maximize",
+        load_if_exists=True,
+    )
+
+
+def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> None:
+    finished = [trial for trial in study.trials if trial.state.is_finished()]
+
+    def tell(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:
+        value = "given up" if trial.value is None else f"{trial.value:.3f}"
+        console.print(f"trial {trial.number}: {value}  {trial.params}", highlight=False)
+
+    study.optimize(
+        lambda trial: _objective(config, trial),
+        n_trials=max(0, config.trials - len(finished)),
+        callbacks=[tell],
+    )
+
+
+def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
+    training = config.training
+    hyperparameters = load_hyperparameters(None, config.algo, config.env)
+    if trial.number > 0:  # the first shows what the file's own values are worth
+        hyperparameters |= SEARCH_SPACES[config.algo](trial)
+    venv = make_training_env(training, hyperparameters)
+    model = build_model(config.algo, config.seed, hyperparameters, venv)
+    interval = max(1, config.timesteps // config.evaluations // venv.num_envs)
+    watch = _Watch(trial, config, make_evaluation_env(training, hyperparameters), interval)
+    try:
+        model.learn(config.timesteps, callback=[*callbacks_of(hyperparameters), watch])
+    finally:
+        venv.close()
+    if watch.pruned:
+        raise optuna.TrialPruned()
+    return watch.score
+
+
+def study_table(study: optuna.Study, config: TuneConfig) -> str:
+    """Return all trials as a Markdown table, the best first."""
+    trials = sorted(
+        (trial for trial in study.trials if trial.state.is_finished()),
+        key=lambda trial: (trial.value is None, -(trial.value or 0.0)),
+    )
+    names = sorted({name for trial in trials for name in trial.params})
+    header = ["trial", "score", *names]
+    lines = [f"`{config.command}`", "", _row(header), _row(["---"] * len(header))]
+    for trial in trials:
+        value = "given up" if trial.value is None else f"{trial.value:.3f}"
+        cells = [_cell(trial.params.get(name)) for name in names]
+        lines.append(_row([str(trial.number), value, *cells]))
+    return "\n".join([*lines, ""])
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "as in the file"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,120 @@
+"""A residual corrects the paper's controller and never leaves its certificate."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from defmanip_gym.baselines.controller import ZeroController
+from defmanip_gym.baselines.residual import ResidualController, corrected
+from defmanip_gym.baselines.residual_action import (
+    ResidualAction,
+    ResidualVectorAction,
+    residual_authority,
+)
+from defmanip_gym.baselines.tanner import TannerController
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.params import BeamParams
+from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
+
+ID = "defmanip_gym:DeformTransport-v0"
+
+
+@pytest.fixture(scope="module")
+def certificate():
+    return certify(BeamParams(), method="phase_plane", conditions=TRANSPORT_CONDITIONS)
+
+
+class Constant:
+    """Asks for the same action always."""
+
+    def __init__(self, *action):
+        self.action = np.array(action)
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return np.broadcast_to(self.action, (*observation.shape[:-1], 3)), state
+
+
+def test_correction_is_limited_in_itself_and_with_the_base():
+    base = np.array([[0.9, 0.0, -1.0]])
+    assert corrected(base, np.array([[5.0, -0.5, -1.0]]), 0.2) == pytest.approx(
+        np.array([[1.0, -0.1, -1.0]])
+    )
+
+
+def test_zero_residual_leaves_the_papers_controller_alone(certificate):
+    envs = gymnasium.make_vec(ID, num_envs=3)
+    observation, _ = envs.reset(seed=0)
+    base = TannerController(certificate=certificate)
+    both = ResidualController(base, ZeroController(), authority=0.5)
+    plain, plain_state = base.predict(observation)
+    action, state = both.predict(observation)
+    assert action == pytest.approx(plain)
+    assert all(np.array_equal(a, b) for a, b in zip(state, plain_state, strict=True))
+    envs.close()
+
+
+def test_training_environment_does_what_the_controller_does_later(certificate):
+    """Residual actions in the wrapper, and the same policy as a controller, move alike."""
+    residual = Constant(0.7, -0.2, 0.1)
+    training = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40))
+    later = NuMaxVectorActionScaling(
+        gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40), certificate
+    )
+    controller = ResidualController(
+        TannerController(certificate=certificate),
+        residual,
+        authority=residual_authority(certificate, TransportConfig()),
+    )
+    trained, _ = training.reset(seed=3)
+    seen, _ = later.reset(seed=3)
+    state, start = None, np.ones(2, dtype=bool)
+    for _ in range(90):  # over two resets
+        actions, state = controller.predict(seen, state, start)
+        seen, _, terminated, truncated, _ = later.step(actions)
+        start = terminated | truncated
+        trained, *_ = training.step(residual.predict(trained)[0])
+        assert trained == pytest.approx(seen, abs=1e-12)
+    training.close()
+    later.close()
+
+
+def test_single_and_batched_wrapper_agree():
+    single = ResidualAction(gymnasium.make(ID))
+    batch = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=1))
+    one, _ = single.reset(seed=5)
+    many, _ = batch.reset(seed=5)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        action = rng.uniform(-1, 1, 3)
+        one, *_ = single.step(action)
+        many, *_ = batch.step(action[None])
+        assert one == pytest.approx(many[0], abs=1e-12)
+    single.close()
+    batch.close()
+
+
+def test_wildest_residual_stays_within_sigma():
+    env = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=8, max_episode_steps=600))
+    _, info = env.reset(seed=0)
+    smallest = info["constraint_margin"].min()
+    for step in range(500):
+        sign = 1.0 if (step // 35) % 2 else -1.0  # half a period of the swing
+        _, _, _, _, info = env.step(np.full((8, 3), sign))
+        smallest = min(smallest, info["constraint_margin"].min())
+    assert 0 < smallest < 0.9 * np.pi / 6  # it swings, and not beyond σ
+    env.close()
+
+
+def test_batches_that_reset_otherwise_are_refused():
+    env = gymnasium.make_vec(ID, num_envs=2, autoreset_mode="NextStep")
+    with pytest.raises(ParameterError, match="SAME_STEP"):
+        ResidualVectorAction(env)
+    env.close()
+
+
+@pytest.mark.parametrize("authority", [0.0, 1.5, float("nan")])
+def test_impossible_authority_is_refused(authority):
+    with pytest.raises(ParameterError, match="authority"):
+        ResidualController(ZeroController(), ZeroController(), authority=authority)
