@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-State = tuple[NDArray[Any], ...]
+State = tuple[Any, ...]
 
 
 class Controller(Protocol):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.baselines.controller import Controller, State
 from defmanip_gym.errors import ParameterError
+from defmanip_gym.validation import require_whole
 
 Array = NDArray[np.float64]
 
@@ -20,21 +21,26 @@ def corrected(base: Array, residual: Array, authority: float) -> Array:
 
 
 class ResidualController:
-    """A controller plus a small correction.
+    """A controller plus a small correction, decided on now and then and held in between.
 
     Args:
-        base: decides what is corrected; the state is its own.
+        base: decides what is corrected.
         residual: a policy without state, on the same observations.
         authority: largest correction of a normalized action, in (0, 1].
+        decision_periods: control periods between two decisions of the residual.
 
     Raises:
-        ParameterError: an authority out of range.
+        ParameterError: arguments out of range.
     """
 
-    def __init__(self, base: Controller, residual: Controller, *, authority: float) -> None:
+    def __init__(
+        self, base: Controller, residual: Controller, *, authority: float, decision_periods: int
+    ) -> None:
         if not 0.0 < authority <= 1.0:
             raise ParameterError("authority", authority, "0 < authority <= 1", "Choose a share.")
-        self.base, self.residual, self.authority = base, residual, authority
+        require_whole("decision_periods", decision_periods, 1)
+        self.base, self.residual = base, residual
+        self.authority, self.decision_periods = authority, decision_periods
 
     def predict(
         self,
@@ -43,7 +49,14 @@ class ResidualController:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[Array, State | None]:
-        """Return the corrected action and the base's next state."""
-        action, state = self.base.predict(observation, state, episode_start, deterministic)
-        residual, _ = self.residual.predict(observation, None, episode_start, deterministic)
-        return corrected(action, residual, self.authority), state
+        """Return the corrected action and (base's state, held residual, periods it is held for)."""
+        below, held, periods = (None, None, None) if state is None else state
+        action, below = self.base.predict(observation, below, episode_start, deterministic)
+        decided, _ = self.residual.predict(observation, None, episode_start, deterministic)
+        if held is None:
+            held, periods = decided, np.zeros(action.shape[:-1], dtype=np.int64)
+        elif episode_start is not None:
+            periods = np.where(episode_start, 0, periods)
+        held = np.where(np.expand_dims(periods == 0, -1), decided, held)
+        following = (periods + 1) % self.decision_periods
+        return corrected(action, held, self.authority), (below, held, following)

@@ -17,6 +17,7 @@ from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
+from defmanip_gym.validation import require_positive, require_whole
 from defmanip_gym.wrappers.nu_max_scaling import (
     NuMaxActionScaling,
     NuMaxVectorActionScaling,
@@ -25,36 +26,57 @@ from defmanip_gym.wrappers.nu_max_scaling import (
 
 Array = NDArray[np.float64]
 
+_ENDINGS = ("final_obs", "final_info", "_final_obs", "_final_info")
 
-def residual_authority(certificate: Certificate, config: TransportConfig) -> float:
-    """Return the largest correction of a normalized action: the certified acceleration."""
-    return min(certificate.acceleration_bound / config.task.max_acceleration_m_s2, 1.0)
+
+def residual_authority(
+    certificate: Certificate, config: TransportConfig, authority: float
+) -> float:
+    """Return the largest correction of a normalized action, ``authority`` certified accelerations.
+
+    Raises:
+        ParameterError: an authority that is not positive.
+    """
+    require_positive("authority", authority)
+    limit = config.task.max_acceleration_m_s2
+    return min(authority * certificate.acceleration_bound / limit, 1.0)
 
 
 class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
     """The same as :class:`ResidualAction` for a batch, in SAME_STEP mode.
 
+    Where an episode ends before its decision's time is over, its successor begins with the rest of
+    that time, uncorrected and unrewarded.
+
     Args:
         env: a batched DeformTransport environment in task mode.
         certificate: method that computes what base controller and wrapper keep to.
+        decision_periods: control periods that an action is held for.
+        authority: largest correction, in units of the certified acceleration; above 1 a residual
+            can outweigh the controller.
 
     Raises:
         CertificateError: there is no such certificate for the environment's beam.
-        ParameterError: the environment resets in another way.
+        ParameterError: the environment resets in another way, or no whole number of periods.
     """
 
     def __init__(
-        self, env: gymnasium.vector.VectorEnv[Any, Any, Any], certificate: str = "phase_plane"
+        self,
+        env: gymnasium.vector.VectorEnv[Any, Any, Any],
+        certificate: str = "phase_plane",
+        decision_periods: int = 1,
+        authority: float = 1.0,
     ) -> None:
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             raise ParameterError(
                 "autoreset_mode", mode, "AutoresetMode.SAME_STEP", "Make the batch in that mode."
             )
+        require_whole("decision_periods", decision_periods, 1)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxVectorActionScaling(env, bound))
-        self._base = base
-        self._authority = residual_authority(bound, transport_config(env))
+        self._base, self._decision_periods = base, decision_periods
+        self._authority = residual_authority(bound, transport_config(env), authority)
         self._state: State | None = None
         self._action: Array | None = None
 
@@ -73,11 +95,37 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
     def step(
         self, actions: Array
     ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Step with the corrected actions."""
+        """Step with the corrected actions for the time of a decision."""
+        rewards, cost = np.zeros((2, self.num_envs))
+        terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)
+        last: dict[str, Any] = {}
+        for _ in range(self._decision_periods):
+            running = ~(terminated | truncated)
+            observation, reward, ended, cut, info = self._step_once(
+                np.where(running[:, None], actions, 0.0)
+            )
+            rewards += np.where(running, reward, 0.0)
+            fresh = running & (ended | cut)
+            spent = info["cost"]
+            if fresh.any():
+                spent = np.where(fresh, info["final_info"]["cost"], spent)
+                _keep(last, info, fresh)
+            cost += np.where(running, spent, 0.0)
+            terminated |= fresh & ended
+            truncated |= fresh & cut
+        info = {key: value for key, value in info.items() if key not in _ENDINGS}
+        info["cost"] = np.where(terminated | truncated, 0.0, cost)
+        if last:
+            last["final_info"]["cost"] = cost
+        return observation, rewards, terminated, truncated, info | last
+
+    def _step_once(
+        self, residual: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         if self._action is None:
             raise ResetNeeded("Call reset() before the first step().")
         observation, reward, terminated, truncated, info = self.env.step(
-            corrected(self._action, actions, self._authority)
+            corrected(self._action, residual, self._authority)
         )
         self._decide(observation, terminated | truncated)
         return observation, reward, terminated, truncated, info
@@ -86,34 +134,58 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
         self._action, self._state = self._base.predict(observation, self._state, started)
 
 
+def _keep(last: dict[str, Any], info: dict[str, Any], fresh: NDArray[np.bool_]) -> None:
+    """Add the endings of the episodes ``fresh`` to those of this decision."""
+    for key in _ENDINGS:
+        if key not in last:
+            last[key] = info[key]
+        elif isinstance(last[key], dict):
+            for name, values in last[key].items():
+                values[fresh] = info[key][name][fresh]
+        else:
+            last[key][fresh] = info[key][fresh]
+
+
 class ResidualAction(
     gymnasium.Wrapper[Array, Array, Array, Array], gymnasium.utils.RecordConstructorArgs
 ):
     """Makes the action a correction of the paper's controller, and certifies the sum.
 
     The controller knows the environment's robot and beam and keeps to the certificate's bounds. An
-    action adds up to the certified acceleration to each axis of its command, and
-    :class:`~defmanip_gym.wrappers.nu_max_scaling.NuMaxActionScaling` brings the sum back into the
-    certificate.
+    action adds up to ``authority`` times the certified acceleration to each axis of its command,
+    and :class:`~defmanip_gym.wrappers.nu_max_scaling.NuMaxActionScaling` brings the sum back into
+    the certificate. An action is held for some control periods, in which rewards and costs add up:
+    the controller's own feedback hides what a correction of a single period does.
 
     Args:
         env: a DeformTransport environment in task mode.
         certificate: method that computes what base controller and wrapper keep to.
+        decision_periods: control periods that an action is held for.
+        authority: largest correction, in units of the certified acceleration; above 1 a residual
+            can outweigh the controller.
 
     Raises:
         CertificateError: there is no such certificate for the environment's beam.
+        ParameterError: no whole number of periods.
     """
 
     vector_wrapper = ResidualVectorAction
 
     def __init__(
-        self, env: gymnasium.Env[Array, Array], certificate: str = "phase_plane"
+        self,
+        env: gymnasium.Env[Array, Array],
+        certificate: str = "phase_plane",
+        decision_periods: int = 1,
+        authority: float = 1.0,
     ) -> None:
-        gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=certificate)
+        gymnasium.utils.RecordConstructorArgs.__init__(
+            self, certificate=certificate, decision_periods=decision_periods, authority=authority
+        )
+        require_whole("decision_periods", decision_periods, 1)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxActionScaling(env, bound))
-        self._base = base
-        self._authority = residual_authority(bound, transport_config(env))
+        self._base, self._decision_periods = base, decision_periods
+        self._authority = residual_authority(bound, transport_config(env), authority)
         self._state: State | None = None
         self._action: Array | None = None
 
@@ -126,14 +198,19 @@ class ResidualAction(
         return observation, info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Step with the corrected action."""
+        """Step with the corrected action for the time of a decision, or until the end."""
         if self._action is None:
             raise ResetNeeded("Call reset() before the first step().")
-        observation, reward, terminated, truncated, info = self.env.step(
-            corrected(self._action, action, self._authority)
-        )
-        self._action, self._state = self._base.predict(observation, self._state)
-        return observation, float(reward), terminated, truncated, info
+        total, cost = 0.0, 0.0
+        for _ in range(self._decision_periods):
+            observation, reward, terminated, truncated, info = self.env.step(
+                corrected(self._action, action, self._authority)
+            )
+            self._action, self._state = self._base.predict(observation, self._state)
+            total, cost = total + float(reward), cost + info["cost"]
+            if terminated or truncated:
+                break
+        return observation, total, terminated, truncated, info | {"cost": cost}
 
 
 def _base_and_certificate(env: Any, method: str) -> tuple[TannerController, Certificate]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from inspect import signature
 from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -10,7 +12,8 @@ from torch import nn
 
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.card import AgentCard
-from defmanip_gym.baselines.residual_action import ResidualAction
+from defmanip_gym.baselines.residual_action import ResidualAction, residual_authority
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.params import BeamParams, TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
@@ -52,14 +55,30 @@ def hidden_activation(model: BaseAlgorithm) -> str:
     return names.pop()
 
 
-def residual_of(hyperparameters: dict[str, Any]) -> tuple[str | None, float | None]:
-    """Return certificate and authority in m/s² of a residual policy, (None, None) of another."""
+@dataclass(frozen=True, kw_only=True)
+class Residual:
+    """How a residual policy acts, for its card."""
+
+    certificate: str
+    authority_m_s2: float
+    decision_periods: int
+
+
+def residual_of(hyperparameters: dict[str, Any]) -> Residual | None:
+    """Return how a residual policy acts, None for another."""
     for wrapper, options in components(hyperparameters, "env_wrapper"):
         if wrapper is ResidualAction:
-            method = options.get("certificate", "phase_plane")
+            settings = signature(ResidualAction).bind(None, **options)
+            settings.apply_defaults()
+            method = settings.arguments["certificate"]
             bound = certify(BeamParams(), method=method, conditions=TRANSPORT_CONDITIONS)
-            return method, min(bound.acceleration_bound, TaskParams().max_acceleration_m_s2)
-    return None, None
+            share = residual_authority(bound, TransportConfig(), settings.arguments["authority"])
+            return Residual(
+                certificate=method,
+                authority_m_s2=share * TaskParams().max_acceleration_m_s2,
+                decision_periods=settings.arguments["decision_periods"],
+            )
+    return None
 
 
 def to_actor(model: BaseAlgorithm, card: AgentCard, normalization: RunningMeanStd) -> MlpActor:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import CallbackList, EvalCallback
+from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -30,6 +30,9 @@ from defmanip_gym.training.export import actor_modules, hidden_activation, resid
 from defmanip_gym.training.hyperparameters import checked_hyperparameters, load_hyperparameters
 from defmanip_gym.training.model import build_model, callbacks_of
 from defmanip_gym.training.run_folder import RunFolder
+from defmanip_gym.training.validation_callback import ValidationCallback
+
+LAST_AGENT = "last"  # beside RUN_AGENT, the best on the validation starts
 
 
 def train(config: TrainConfig) -> Path:
@@ -45,13 +48,20 @@ def train(config: TrainConfig) -> Path:
     torch.set_num_threads(1)  # physics uses the other cores
     venv = make_training_env(config, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
-    callbacks = callbacks_of(hyperparameters)
+    total = config.total_timesteps or int(hyperparameters["n_timesteps"])
+    interval = max(1, total // config.evaluations)
+    validation = ValidationCallback(
+        make_evaluation_env(config, hyperparameters),
+        episodes=config.evaluation_episodes,
+        interval=interval // venv.num_envs,
+        on_best=lambda: export(folder, RUN_AGENT, config, model, venv),
+    )
+    callbacks = [*callbacks_of(hyperparameters), validation]
     resumable = [callback for callback in callbacks if isinstance(callback, Resumable)]
     if config.resume is not None:
         read_checkpoint(folder.last_checkpoint(), model, venv, resumable)
         # other starts than those of the part before
         venv.seed(training_seed(config.seed, model.num_timesteps))
-    total = config.total_timesteps or int(hyperparameters["n_timesteps"])
     if model.num_timesteps >= total:
         venv.close()
         return folder.path
@@ -63,21 +73,12 @@ def train(config: TrainConfig) -> Path:
         folder.save_checkpoint(
             model.num_timesteps, lambda path: write_checkpoint(path, model, venv, resumable)
         )
-        export(folder, RUN_AGENT, config, model, venv)
+        export(folder, LAST_AGENT, config, model, venv)
 
-    interval = max(1, total // config.evaluations)
-    evaluation = EvalCallback(
-        make_evaluation_env(config, hyperparameters),
-        n_eval_episodes=config.evaluation_episodes,
-        eval_freq=max(1, interval // venv.num_envs),
-        log_path=curves,
-        verbose=0,
-        warn=False,
-    )
     try:
         model.learn(
             total - model.num_timesteps,
-            callback=CallbackList([*callbacks, evaluation, Periodically(save, interval)]),
+            callback=CallbackList([*callbacks, Periodically(save, interval)]),
             reset_num_timesteps=False,
             progress_bar=True,
         )
@@ -100,7 +101,7 @@ def export(
     """Write the model's policy as a portable agent into the run folder."""
     started = folder.read_config()  # as it was when the run began, not now
     hyperparameters = started["hyperparameters"]
-    certificate, authority = residual_of(hyperparameters)
+    residual = residual_of(hyperparameters)
     card = AgentCard(
         env_id=config.env_id,
         observation_size=int(np.prod(venv.observation_space.shape or ())),
@@ -111,13 +112,14 @@ def export(
         activation=hidden_activation(model),  # type: ignore[arg-type]
         squashed=actor_modules(model)[1],
         normalization=Normalization(clip=venv.clip_obs, variance_floor=venv.epsilon),
-        residual_authority_m_s2=authority,
+        residual_authority_m_s2=residual.authority_m_s2 if residual else None,
+        residual_decision_periods=residual.decision_periods if residual else 1,
         command=started["command"],
         seed=config.seed,
         total_timesteps=model.num_timesteps,
         package_version=started["package_version"],
         git_revision=started["git_revision"],
-        certificate=certificate or config.certificate,
+        certificate=residual.certificate if residual else config.certificate,
     )
     to_actor(model, card, observation_statistics(venv)).save(folder.path / name)
 

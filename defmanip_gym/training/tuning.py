@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import optuna
 import torch
 from filelock import FileLock, Timeout
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from rich.console import Console
-from stable_baselines3.common.callbacks import EvalCallback
+from stable_baselines3.common.callbacks import BaseCallback
 
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.files import write_atomically
@@ -21,6 +20,7 @@ from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model, callbacks_of
 from defmanip_gym.training.search_spaces import SEARCH_SPACES
 from defmanip_gym.training.tune_config import TuneConfig
+from defmanip_gym.training.validation_callback import ValidationCallback
 
 STUDY_FILE, TABLE_FILE = "study.log", "trials.md"
 
@@ -57,36 +57,16 @@ def run_tune(config: TuneConfig) -> Path:
     return table
 
 
-class _Watch(EvalCallback):
-    """Scores the model at intervals and gives hopeless trials up."""
+class _Watch(BaseCallback):
+    """Reports a trial's scores and gives it up if it is hopeless."""
 
-    def __init__(self, trial: optuna.Trial, config: TuneConfig, env: Any, interval: int) -> None:
-        super().__init__(
-            env,
-            n_eval_episodes=config.evaluation_episodes,
-            eval_freq=interval,
-            verbose=0,
-            warn=False,
-        )
-        self.trial, self.score, self.pruned = trial, 0.0, False
-        self._lengths: list[int] = []
-
-    def _log_success_callback(self, locals_: dict[str, Any], globals_: dict[str, Any]) -> None:
-        super()._log_success_callback(locals_, globals_)
-        if locals_["done"]:
-            self._lengths.append(int(locals_["info"]["episode"]["l"]))
+    def __init__(self, trial: optuna.Trial, validation: ValidationCallback) -> None:
+        super().__init__()
+        self.trial, self.validation, self.pruned = trial, validation, False
 
     def _on_step(self) -> bool:
-        due = self.n_calls % self.eval_freq == 0
-        self._lengths = [] if due else self._lengths
-        if not super()._on_step():
-            return False
-        if due:
-            successes = np.array(self._is_success_buffer, dtype=bool)
-            limit = self.eval_env.get_attr("max_episode_steps")[0]
-            left = 1.0 - np.array(self._lengths[: len(successes)]) / limit
-            self.score = float((successes * left).mean())
-            self.trial.report(self.score, self.num_timesteps)
+        if self.validation.n_calls % self.validation.eval_freq == 0:
+            self.trial.report(self.validation.score, self.num_timesteps)
             self.pruned = self.trial.should_prune()
         return not self.pruned
 
@@ -127,14 +107,20 @@ def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
     venv = make_training_env(training, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
     interval = max(1, config.timesteps // config.evaluations // venv.num_envs)
-    watch = _Watch(trial, config, make_evaluation_env(training, hyperparameters), interval)
+    validation = ValidationCallback(
+        make_evaluation_env(training, hyperparameters),
+        episodes=config.evaluation_episodes,
+        interval=interval,
+        on_best=lambda: None,
+    )
+    watch = _Watch(trial, validation)
     try:
-        model.learn(config.timesteps, callback=[*callbacks_of(hyperparameters), watch])
+        model.learn(config.timesteps, callback=[*callbacks_of(hyperparameters), validation, watch])
     finally:
         venv.close()
     if watch.pruned:
         raise optuna.TrialPruned()
-    return watch.score
+    return validation.score
 
 
 def study_table(study: optuna.Study, config: TuneConfig) -> str:

@@ -47,42 +47,95 @@ def test_zero_residual_leaves_the_papers_controller_alone(certificate):
     envs = gymnasium.make_vec(ID, num_envs=3)
     observation, _ = envs.reset(seed=0)
     base = TannerController(certificate=certificate)
-    both = ResidualController(base, ZeroController(), authority=0.5)
+    both = ResidualController(base, ZeroController(), authority=0.5, decision_periods=4)
     plain, plain_state = base.predict(observation)
-    action, state = both.predict(observation)
+    action, (below, *_) = both.predict(observation)
     assert action == pytest.approx(plain)
-    assert all(np.array_equal(a, b) for a, b in zip(state, plain_state, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(below, plain_state, strict=True))
     envs.close()
+
+
+class Counting:
+    """Asks for as much as it has been called."""
+
+    def __init__(self):
+        self.calls = 0.0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.calls += 1.0
+        return np.full((*observation.shape[:-1], 3), 0.1 * self.calls), state
+
+
+def test_a_decision_is_held_and_made_anew_where_an_episode_starts():
+    controller = ResidualController(
+        ZeroController(), Counting(), authority=1.0, decision_periods=3
+    )
+    state, held = None, []
+    for step in range(7):
+        start = np.array([False, step == 2])
+        action, state = controller.predict(np.zeros((2, 22)), state, start)
+        held.append(action[:, 0].tolist())
+    first, second = np.round(10 * np.array(held).T).astype(int).tolist()
+    assert first == [1, 1, 1, 4, 4, 4, 7]
+    assert second == [1, 1, 3, 3, 3, 6, 6]
 
 
 def test_training_environment_does_what_the_controller_does_later(certificate):
     """Residual actions in the wrapper, and the same policy as a controller, move alike."""
     residual = Constant(0.7, -0.2, 0.1)
-    training = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40))
+    training = ResidualVectorAction(
+        gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40), decision_periods=5, authority=2.0
+    )
     later = NuMaxVectorActionScaling(
         gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40), certificate
     )
     controller = ResidualController(
         TannerController(certificate=certificate),
         residual,
-        authority=residual_authority(certificate, TransportConfig()),
+        authority=residual_authority(certificate, TransportConfig(), 2.0),
+        decision_periods=5,
     )
     trained, _ = training.reset(seed=3)
     seen, _ = later.reset(seed=3)
     state, start = None, np.ones(2, dtype=bool)
-    for _ in range(90):  # over two resets
-        actions, state = controller.predict(seen, state, start)
-        seen, _, terminated, truncated, _ = later.step(actions)
-        start = terminated | truncated
-        trained, *_ = training.step(residual.predict(trained)[0])
+    for _ in range(18):  # over two resets
+        rewards = np.zeros(2)
+        for _ in range(5):
+            actions, state = controller.predict(seen, state, start)
+            seen, reward, terminated, truncated, _ = later.step(actions)
+            start = terminated | truncated
+            rewards += reward
+        trained, told, *_ = training.step(residual.predict(trained)[0])
         assert trained == pytest.approx(seen, abs=1e-12)
+        assert told == pytest.approx(rewards, abs=1e-12)
     training.close()
     later.close()
 
 
+def test_an_ending_amid_a_decision_is_told_with_its_last_observation_and_cost():
+    """Episodes of 7 periods, decisions of 5: every other one is cut after 2 periods."""
+    env = gymnasium.make_vec(ID, num_envs=2, max_episode_steps=7, constraint_mode="cost")
+    training = ResidualVectorAction(env, decision_periods=5)
+    plain = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=2, max_episode_steps=7))
+    training.reset(seed=1)
+    plain.reset(seed=1)
+    actions = np.full((2, 3), 0.5)
+    *_, truncated, info = training.step(actions)
+    assert not truncated.any() and "final_obs" not in info
+    *_, truncated, info = training.step(actions)
+    assert truncated.all()
+    for _ in range(7):
+        *_, last = plain.step(actions)
+    assert info["final_obs"] == pytest.approx(last["final_obs"], abs=1e-12)
+    assert info["final_info"]["cost"].tolist() == [0.0, 0.0]
+    training.close()
+    plain.close()
+
+
+
 def test_single_and_batched_wrapper_agree():
-    single = ResidualAction(gymnasium.make(ID))
-    batch = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=1))
+    single = ResidualAction(gymnasium.make(ID), decision_periods=3)
+    batch = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=1), decision_periods=3)
     one, _ = single.reset(seed=5)
     many, _ = batch.reset(seed=5)
     rng = np.random.default_rng(0)
@@ -96,7 +149,9 @@ def test_single_and_batched_wrapper_agree():
 
 
 def test_wildest_residual_stays_within_sigma():
-    env = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=8, max_episode_steps=600))
+    env = ResidualVectorAction(
+        gymnasium.make_vec(ID, num_envs=8, max_episode_steps=600), authority=15.0
+    )
     _, info = env.reset(seed=0)
     smallest = info["constraint_margin"].min()
     for step in range(500):
@@ -117,4 +172,6 @@ def test_batches_that_reset_otherwise_are_refused():
 @pytest.mark.parametrize("authority", [0.0, 1.5, float("nan")])
 def test_impossible_authority_is_refused(authority):
     with pytest.raises(ParameterError, match="authority"):
-        ResidualController(ZeroController(), ZeroController(), authority=authority)
+        ResidualController(
+            ZeroController(), ZeroController(), authority=authority, decision_periods=1
+        )

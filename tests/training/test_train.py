@@ -45,8 +45,14 @@ def config(tmp_path):
     return make
 
 
-def resumable(hyperparameters):
-    return [c for c in training.callbacks_of(hyperparameters) if isinstance(c, training.Resumable)]
+class Deaf:
+    """A callback that takes whatever a checkpoint kept."""
+
+    def state(self):
+        return {}
+
+    def set_state(self, state):
+        pass
 
 
 def sb3_actions(folder, config, observations):
@@ -55,7 +61,8 @@ def sb3_actions(folder, config, observations):
     venv = make_training_env(config, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
     checkpoint = training.RunFolder(folder).last_checkpoint()
-    training.read_checkpoint(checkpoint, model, venv, resumable(hyperparameters))
+    kept = json.loads((checkpoint / "state.json").read_text())["callbacks"]
+    training.read_checkpoint(checkpoint, model, venv, [Deaf() for _ in kept])
     return model.predict(venv.normalize_obs(observations), deterministic=True)[0]
 
 
@@ -65,7 +72,7 @@ def test_exported_agent_acts_as_the_trained_model(algo, config):
     folder = training.train(settings)
     env = gymnasium.make(f"defmanip_gym:{ENV_ID}")
     observations = np.array([env.reset(seed=seed)[0] for seed in range(8)])
-    actions, _ = load_agent(folder).predict(observations)
+    actions, _ = load_agent(folder / "last.json").predict(observations)
     assert actions == pytest.approx(sb3_actions(folder, settings, observations), abs=1e-5)
     stored = json.loads((folder / "config.json").read_text())
     assert stored["train"]["algo"] == algo and stored["git_revision"]
@@ -75,6 +82,8 @@ def test_exported_agent_acts_as_the_trained_model(algo, config):
         "checkpoints",
         "agent.json",
         "agent.safetensors",
+        "last.json",
+        "last.safetensors",
     }
     (progress,) = (folder / "curves").rglob("progress.csv")
     assert progress.stat().st_size > 0
@@ -83,10 +92,10 @@ def test_exported_agent_acts_as_the_trained_model(algo, config):
 @pytest.mark.parametrize("algo", ["ppo", "sac"])
 def test_resumed_run_goes_on_from_its_checkpoint(algo, config):
     folder = training.train(config(algo))
-    before = load_agent(folder).card.total_timesteps
+    before = load_agent(folder / "last.json").card.total_timesteps
     again = training.train(TrainConfig(resume=folder, total_timesteps=1024))
     assert again == folder
-    assert load_agent(folder).card.total_timesteps == 1024 > before
+    assert load_agent(folder / "last.json").card.total_timesteps == 1024 > before
     curves = sorted((folder / "curves").rglob("progress.csv"))
     assert len(curves) == 2 and all(curve.stat().st_size > 0 for curve in curves)
     assert training.train(TrainConfig(resume=folder)) == folder  # finished: nothing to do
@@ -109,21 +118,34 @@ def test_interrupted_run_keeps_its_state_and_says_how_to_go_on(config, monkeypat
     assert exit_info.value.code == 130
     assert "--resume" in (message := capsys.readouterr().out)
     folder = training.Path(message.split("--resume ")[1].strip())
-    assert load_agent(folder).card.total_timesteps == 256
+    assert load_agent(folder / "last.json").card.total_timesteps == 256
     monkeypatch.undo()
     training.train(TrainConfig(resume=folder))
-    assert load_agent(folder).card.total_timesteps == 512
+    assert load_agent(folder / "last.json").card.total_timesteps == 512
+
+
+def test_the_agent_of_a_run_is_the_best_on_the_validation_starts(config, monkeypatch):
+    scores = iter([0.2, 0.5, 0.3, 0.1])
+
+    def evaluated(self):
+        self.score = next(scores)
+        return self.score
+
+    monkeypatch.setattr(training.ValidationCallback, "_mean_score", evaluated)
+    folder = training.train(config(evaluations=4))
+    assert load_agent(folder).card.total_timesteps == 256
+    assert load_agent(folder / "last.json").card.total_timesteps == 512
 
 
 def test_price_of_violations_survives_an_interruption(config):
     folder = training.train(config("lagrangian"))
     state = training.RunFolder(folder).last_checkpoint() / "state.json"
     content = json.loads(state.read_text())
-    content["callbacks"] = [{"multiplier": 2.5}]
+    content["callbacks"][0] = {"multiplier": 2.5}
     state.write_text(json.dumps(content))
     training.train(TrainConfig(resume=folder, total_timesteps=640))
     again = training.RunFolder(folder).last_checkpoint() / "state.json"
-    (numbers,) = json.loads(again.read_text())["callbacks"]
+    numbers, _ = json.loads(again.read_text())["callbacks"]
     assert numbers["multiplier"] == pytest.approx(2.5, abs=0.1)
 
 

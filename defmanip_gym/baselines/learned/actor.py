@@ -28,10 +28,13 @@ from defmanip_gym.files import write_atomically
 Array = NDArray[np.float64]
 
 CARD_SUFFIX, TENSOR_SUFFIX = ".json", ".safetensors"
-_ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
-    "tanh": np.tanh,
-    "relu": lambda x: np.maximum(x, 0.0),
-}
+
+
+def _relu(x: Array) -> Array:
+    return np.maximum(x, 0.0)
+
+
+_ACTIVATIONS: dict[str, Callable[[Array], Array]] = {"tanh": np.tanh, "relu": _relu}
 # Beyond what any training makes; within them no sum of the network overflows.
 _LARGEST_TENSOR_BYTES = 64 * 2**20
 _LARGEST_WEIGHT = 1e9

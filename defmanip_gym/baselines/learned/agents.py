@@ -120,4 +120,6 @@ def controller_of(
         )
     base: Controller = TannerController(certificate=certificate)
     authority = card.residual_authority_m_s2 / TaskParams().max_acceleration_m_s2
-    return ResidualController(base, actor, authority=authority)
+    return ResidualController(
+        base, actor, authority=authority, decision_periods=card.residual_decision_periods
+    )

@@ -90,6 +90,7 @@ class AgentCard:
         normalization: of the observations; mean and variance are tensors.
         residual_authority_m_s2: None for a controller of its own; a number if the output, times
             this acceleration, is added to the command of the paper's controller.
+        residual_decision_periods: control periods that such an output is held for.
         algorithm: SB3's class name in lower case.
         recipe: name of the hyperparameter file.
         hyperparameters: as in that file.
@@ -113,6 +114,7 @@ class AgentCard:
     squashed: bool
     normalization: Normalization = field(default_factory=Normalization)
     residual_authority_m_s2: float | None = None
+    residual_decision_periods: int = 1
     algorithm: str
     recipe: str
     hyperparameters: Mapping[str, Any]
@@ -134,6 +136,7 @@ class AgentCard:
             ("action_size", 1),
             ("seed", 0),
             ("total_timesteps", 0),
+            ("residual_decision_periods", 1),
         ):
             number = getattr(self, name)
             _require(name, number, _is_whole(number, low), f"a whole number >= {low}")

@@ -1,0 +1,33 @@
+"""The agent of a run is the best on the validation starts, not the last."""
+
+import gymnasium
+import pytest
+
+from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
+from defmanip_gym.training.validation_callback import ValidationCallback
+
+
+def episode(success, length, cost=0.0):
+    return {"done": True, "info": {"is_success": success, "episode": {"l": length, "cost": cost}}}
+
+
+@pytest.fixture
+def callback():
+    env = Sb3VecEnv(gymnasium.make_vec("defmanip_gym:DeformTransport-v0", num_envs=1))
+    yield ValidationCallback(env, episodes=1, interval=1, on_best=lambda: None)
+    env.close()
+
+
+def test_only_arrivals_without_violation_score_and_sooner_is_better(callback):
+    callback._is_success_buffer = []
+    for one in (episode(True, 250), episode(True, 250, cost=3.0), episode(False, 1000)):
+        callback._log_success_callback(one, {})
+    assert callback._episode_scores == [0.75, 0.0, 0.0]
+
+
+def test_a_checkpoint_keeps_the_best_score(callback):
+    callback.best_score = 0.6
+    state = callback.state()
+    callback.best_score = 0.0
+    callback.set_state(state)
+    assert callback.best_score == 0.6
