@@ -1,10 +1,17 @@
-# The project's menu: make compare | test | lint | check | clean
+# The project's menu: make compare | benchmark | agents | test | lint | check | clean
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: help install compare test lint check clean
+.PHONY: help install compare benchmark agents committed test lint check clean
+
+# A run folder names environment, recipe and seed
+SEEDS := 0 1 2 3 4
+RECIPES := ppo residual lagrangian sac tqc
+RUNS := $(foreach recipe,$(RECIPES),$(SEEDS:%=runs/DeformTransport-v0-$(recipe)-seed%)) \
+        $(SEEDS:%=runs/DeformTransportRandomized-v0-ppo-seed%)
+recipe_and_seed = --algo $(firstword $(subst -seed, ,$*))$(1) --seed $(lastword $(subst -seed, ,$*))
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -20,6 +27,24 @@ install: $(INSTALLED)  ## create .venv with the project and its pinned dependenc
 
 compare: $(INSTALLED)  ## run all controllers on the same scenarios; table and HTML report
 	$(BIN)/python evaluate.py
+
+benchmark: $(INSTALLED)  ## run all suites with all agents; writes docs/results.md and the agents' scores
+	$(BIN)/python evaluate.py --suites all --episodes all --members all --output results/benchmark
+	$(BIN)/defmanip agents --score results/benchmark
+	$(BIN)/python docs/make_results.py
+
+# defmanip ship takes no run of changed sources: better to say so before than after half a day
+committed:
+	@git diff --quiet HEAD || { echo "Commit your changes first: cards name the revision."; exit 1; }
+
+agents: $(RUNS)  ## train and ship all agents, half a day; runs that are there are kept
+	$(BIN)/defmanip ship $(RUNS)
+
+runs/DeformTransport-v0-%: | $(INSTALLED) committed
+	$(BIN)/python train.py $(call recipe_and_seed)
+
+runs/DeformTransportRandomized-v0-%: | $(INSTALLED) committed
+	$(BIN)/python train.py $(call recipe_and_seed, --env DeformTransportRandomized-v0)
 
 test: $(INSTALLED)  ## run the test suite
 	$(BIN)/python -m pytest --numprocesses 2

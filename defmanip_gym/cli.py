@@ -10,11 +10,13 @@ from typing import Any, TypeVar
 import tyro
 from rich.console import Console
 
+from defmanip_gym.catalogue.config import AgentsConfig
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.errors import DefmanipError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.ship_config import ShipConfig
 from defmanip_gym.training.tune_config import TuneConfig
 
 Config = TypeVar("Config")
@@ -28,6 +30,8 @@ def main() -> None:
         "compare": ComparisonConfig,
         "certify": CertifyConfig,
         "reproduce": ReproductionConfig,
+        "agents": AgentsConfig,
+        "ship": ShipConfig,
     }
     _guarded(
         lambda: _run(
@@ -67,6 +71,10 @@ def _run(config: object) -> None:
         from defmanip_gym.training.tuning import run_tune
 
         run_tune(config)
+    elif isinstance(config, ShipConfig):
+        from defmanip_gym.training.shipping import run_ship
+
+        run_ship(config)
     elif isinstance(config, CertifyConfig):
         from defmanip_gym.certification.command import run_certify  # as does matplotlib
 
@@ -75,6 +83,10 @@ def _run(config: object) -> None:
         from defmanip_gym.reproduction.reproduce import run_reproduction  # matplotlib, too
 
         run_reproduction(config)
+    elif isinstance(config, AgentsConfig):
+        from defmanip_gym.catalogue.command import run_agents
+
+        run_agents(config)
 
 
 def _guarded(command: Callable[[], None]) -> None:

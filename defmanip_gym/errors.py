@@ -51,7 +51,7 @@ class AgentFileError(InvalidValueError):
 
 
 class RunFolderError(InvalidValueError):
-    """A training run folder that cannot be created or resumed."""
+    """A training run folder that cannot be created, resumed or shipped."""
 
 
 class RecordError(InvalidValueError):

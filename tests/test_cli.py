@@ -36,9 +36,9 @@ def test_defmanip_lists_its_commands():
         (("train.py", "--resume", "nowhere"), "train.py"),
         (("train.py", "--algo", "dqn"), "ppo"),
         (("evaluate.py", "--contestants", "nobody"), "tanner/l1"),
-        (("evaluate.py", "--sigma-rad", "2"), "1.0472"),
+        (("evaluate.py", "--suites", "nomnial"), "mismatch"),
         (("evaluate.py", "--agents", "nothing.safetensors"), "nothing.json"),
-        (("evaluate.py", "--damping", "-1"), "damping"),
+        (("evaluate.py", "--episodes", "0"), "episodes"),
     ],
 )
 def test_wrong_input_gets_a_message_and_no_traceback(words, said, tmp_path):

@@ -24,7 +24,7 @@ LAYERS = [
     {"wrappers"},
     {"baselines"},
     {"evaluation"},
-    {"reproduction", "certification"},
+    {"reproduction", "certification", "catalogue"},
     {"training"},
     {"cli", "__main__"},
 ]

@@ -4,70 +4,96 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 from rich.console import Console
 
-from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.baselines.learned.agents import load_agent, shipped_families
 from defmanip_gym.display import progress_bar
 from defmanip_gym.errors import RecordError
+from defmanip_gym.evaluation.assignments import assignments
+from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestants import (
-    SHIPPED_AGENT,
+    Certificates,
     Contestant,
     agent_contestants,
-    default_contestants,
+    standard_contestants,
+    standard_names,
 )
-from defmanip_gym.evaluation.outputs import TRACE_FOLDER, print_results, write_outputs
+from defmanip_gym.evaluation.outputs import print_results, write_outputs
 from defmanip_gym.evaluation.records import EpisodeRecord
-from defmanip_gym.evaluation.rollout import rollout
-from defmanip_gym.evaluation.scenarios import Scenario, comparison_scenarios
-from defmanip_gym.evaluation.store import RecordStore, fingerprint
-from defmanip_gym.evaluation.traces import Trace
-from defmanip_gym.validation import require_choice
-from defmanip_gym.version import __version__
+from defmanip_gym.evaluation.store import RecordFolder, remove_leftovers
+from defmanip_gym.evaluation.suites import suite_named
+from defmanip_gym.evaluation.timings import TIMING_FILE, measured_timings
+from defmanip_gym.evaluation.traces import TRACE_FOLDER
+from defmanip_gym.evaluation.workers import running
 
 __all__ = ["ComparisonConfig", "run_comparison"]
 
-RECORD_FILE = "records.jsonl"
-_TRACED_SCENARIOS = 4  # the paper's and three sampled ones
+RECORD_FOLDER = "records"
 
 
 def run_comparison(config: ComparisonConfig) -> Path:
     """Run what is missing, write all outputs, print the table, return the report's path.
 
-    Ctrl-C keeps the finished episodes and exits with 130 after saying how to go on.
+    Jobs run in ``config.jobs`` processes. A cluster takes them over as a joblib backend, and needs
+    no disk of this machine (but for SB3's zip files, which it loads itself), since results come
+    back here before they are written:
+
+        with joblib.parallel_config(backend="dask"): run_comparison(config)
+
+    Ctrl-C keeps the finished jobs and exits with 130 after saying how to go on.
 
     Raises:
-        RecordError: the output folder cannot be used or holds another comparison.
-        ParameterError: unknown contestants or settings out of range.
-        CertificateError: σ or the damping leaves no room for the certificates.
-        AgentFileError: the shipped agent takes part but cannot be loaded.
+        RecordError: the output folder cannot be used, or holds damaged or other records.
+        ParameterError: unknown contestants.
+        AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
     console = Console()
-    beam, sigma_rad = config.environment.beam, config.sigma_rad
-    everyone = default_contestants(beam, sigma_rad)
-    guests = [agent_contestants(path, beam, sigma_rad) for path in config.agents]
-    by_name = {c.name: c for c in (*_selected(everyone, config), *chain.from_iterable(guests))}
-    contestants = tuple(by_name.values())  # an agent named twice takes part once
-    scenarios = comparison_scenarios(config.episodes)
+    contestants = _contestants(config)
     try:
         with _exclusive(config.output):
-            store = _open_store(config, _fingerprint(config, everyone, scenarios))
-            _run_missing(config, contestants, scenarios, store, console)
-            summaries, report = write_outputs(config, contestants, store.records)
+            records = _complete_records(config, contestants, console)
+            measured_timings(config.output / TIMING_FILE, contestants)
+            summaries, report = write_outputs(config, contestants, records)
     except KeyboardInterrupt:
         console.print(
-            f"Stopped; finished episodes are kept in {config.output}. "
+            f"Stopped; finished jobs are kept in {config.output}. "
             "Go on by running the same command again (without --fresh)."
         )
         raise SystemExit(130) from None
     print_results(console, summaries, report)
+    _print_broken(console, records)
     return report
+
+
+def _contestants(config: ComparisonConfig) -> tuple[Contestant, ...]:
+    certificates = Certificates()
+    wanted = standard_names() if config.contestants is None else config.contestants
+    chosen = standard_contestants(wanted, certificates, config.member_limit)
+    guests = chain.from_iterable(
+        agent_contestants(path, certificates, allow_pickle=config.allow_pickle)
+        for path in config.agents
+    )
+    by_name = {contestant.name: contestant for contestant in (*chosen, *guests)}
+    return tuple(by_name.values())  # an agent named twice takes part once
+
+
+def _print_broken(console: Console, records: Sequence[EpisodeRecord]) -> None:
+    """Say which episodes exceeded σ although a certificate promised that none would."""
+    broken = broken_certificates(records)
+    if broken:
+        first = broken[0]
+        console.print(
+            f"{len(broken)} broken certificates: episodes that exceeded σ although the enforced "
+            f"certificate covers them, the first one {first.contestant} (member {first.member}) in "
+            f"{first.scenario} of {first.suite}.",
+            style="bold red",
+            highlight=False,
+            markup=False,
+        )
 
 
 @contextmanager
@@ -90,86 +116,44 @@ def _exclusive(output: Path) -> Iterator[None]:
         ) from error
 
 
-def _selected(everyone: Sequence[Contestant], config: ComparisonConfig) -> tuple[Contestant, ...]:
-    names = [contestant.name for contestant in everyone]
-    for name in config.contestants or ():
-        require_choice("contestants", name, names)
-    wanted = config.contestants or names
-    return tuple(contestant for contestant in everyone if contestant.name in wanted)
+def _complete_records(
+    config: ComparisonConfig, contestants: Sequence[Contestant], console: Console
+) -> tuple[EpisodeRecord, ...]:
+    """Return the records of all chosen episodes, running those that have none yet."""
+    folder, traces = RecordFolder(config.output / RECORD_FOLDER), config.output / TRACE_FOLDER
+    if config.fresh:
+        _discard(config.output)
+    remove_leftovers((folder.root, traces))
+    # all that is there is read before anything runs: damage shows at once
+    work = assignments(config, contestants, folder)
+    by_entry = {assignment.job.entry: assignment for assignment in work}
+    jobs = [assignment.job for assignment in work if assignment.job.suite.scenarios]
+    console.print(_plan(config, contestants, len(work), len(jobs)), highlight=False)
+    with progress_bar(console) as progress, running(jobs, config.jobs) as results:
+        bar = progress.add_task("jobs", total=max(len(jobs), 1), completed=not jobs)
+        for result in results:
+            by_entry[result.job.entry].keep(result, folder, traces)
+            progress.advance(bar)
+    return tuple(record for assignment in work for record in assignment.records)
 
 
-def _fingerprint(
-    config: ComparisonConfig, everyone: Sequence[Contestant], scenarios: Sequence[Scenario]
+def _plan(
+    config: ComparisonConfig, contestants: Sequence[Contestant], total: int, missing: int
 ) -> str:
-    """Identify whatever the records depend on; not who takes part, so that more can join."""
-    agent = SHIPPED_AGENT in shipped_families()
-    return fingerprint(
-        {
-            "package_version": __version__,
-            "environment": asdict(config.environment),
-            "horizon_s": config.horizon_s,
-            "scenarios": [asdict(scenario) for scenario in scenarios],
-            "certificates": {
-                contestant.name: asdict(contestant.certificate)
-                for contestant in everyone
-                if contestant.certificate is not None
-            },
-            "agent": load_agent(SHIPPED_AGENT).digest if agent else None,
-        }
+    """Return what was chosen, in a sentence for each choice."""
+    suites = ", ".join(
+        f"{suite.name} ({len(suite.scenarios)} of {len(suite_named(suite.name).scenarios)})"
+        for suite in config.chosen_suites
+    )
+    members = sum(len(contestant.members) for contestant in contestants)
+    return (
+        f"Suites: {suites} scenarios. Contestants: {len(contestants)} with {members} members. "
+        f"Jobs: {total}, of which {total - missing} are done."
     )
 
 
-def _open_store(config: ComparisonConfig, identity: str) -> RecordStore:
-    path, traces = config.output / RECORD_FILE, config.output / TRACE_FOLDER
-    try:
-        traces.mkdir(parents=True, exist_ok=True)
-        if config.fresh:
-            path.unlink(missing_ok=True)
-            for trace in traces.glob("*.npz"):
-                trace.unlink()
-        return RecordStore(path, identity)
-    except OSError as error:
-        raise RecordError(
-            "output", str(config.output), "a folder that can be written", f"{error}."
-        ) from error
-
-
-def _run_missing(
-    config: ComparisonConfig,
-    contestants: Sequence[Contestant],
-    scenarios: Sequence[Scenario],
-    store: RecordStore,
-    console: Console,
-) -> None:
-    """Run the episodes that have no record yet, contestant by contestant."""
-    jobs: list[tuple[Contestant, Controller, list[Scenario]]] = []
-    for contestant in contestants:
-        finished = store.finished(contestant.name)
-        missing = [scenario for scenario in scenarios if scenario.name not in finished]
-        if missing:  # built before anything runs: a missing agent shows at once
-            controller = contestant.build([scenario.seed for scenario in missing])
-            jobs.append((contestant, controller, missing))
-    steps = config.step_count
-    traced = [scenario.name for scenario in scenarios[:_TRACED_SCENARIOS]]
-
-    def keep(record: EpisodeRecord, trace: Trace | None) -> None:
-        if trace is not None:  # before the record: a record says that all is there
-            trace.save(config.output / TRACE_FOLDER)
-        store.add(record)
-
-    with progress_bar(console) as progress:
-        task = progress.add_task("", total=len(jobs) * steps or 1)
-        for index, (contestant, controller, missing) in enumerate(jobs):
-            progress.update(task, description=contestant.name, completed=index * steps)
-            rollout(
-                contestant.name,
-                controller,
-                missing,
-                config=config.environment,
-                horizon_s=config.horizon_s,
-                certificate=contestant.certificate,
-                traced=traced,
-                on_finished=keep,
-                on_step=lambda: progress.advance(task),
-            )
-        progress.update(task, description="all contestants", completed=len(jobs) * steps or 1)
+def _discard(output: Path) -> None:
+    """Delete what comparisons keep between runs, and nothing else."""
+    for pattern in (f"{RECORD_FOLDER}/*/*.jsonl", f"{TRACE_FOLDER}/*/*.npz", TIMING_FILE):
+        for path in output.glob(pattern):
+            path.unlink()

@@ -2,63 +2,77 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Literal
 
-from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
-from defmanip_gym.validation import require_positive, require_whole
+from defmanip_gym.evaluation.suites import SUITE_NAMES, Suite, suite_named
+from defmanip_gym.validation import require_choice, require_whole
+
+_ALL: Literal["all"] = "all"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonConfig:
-    """Compare controllers on the same starts; a second run goes on where the first stopped.
+    """Compare controllers on the same scenarios; a second run goes on where the first stopped.
 
     Examples:
         python evaluate.py
 
-        python evaluate.py --contestants tanner/l1 ppo --episodes 100 --output results/long
+        python evaluate.py --suites all --episodes all --members all --output results/benchmark
+
+        python evaluate.py --suites mismatch --contestants tanner/l1 ppo ppo/phase_plane
 
         python evaluate.py --agents runs/DeformTransport-v0-sac-seed0 --output results/mine
+
+        python evaluate.py --agents logs/ppo/best_model.zip --allow-pickle --output results/mine
     """
 
     output: Path = Path("results/compare")
-    """Folder for records, table, plots and report."""
-    episodes: int = 24
-    """Scenarios for each contestant: the paper's start and sampled ones."""
-    horizon_s: float = 60.0
-    """Simulated seconds after which an episode times out."""
+    """Folder for records, tables, plots and report."""
+    suites: tuple[str, ...] = ("nominal", "paper")
+    """Names of suites: nominal, paper, mismatch, disturbed, far; or "all"."""
+    episodes: int | Literal["all"] = 24
+    """How many scenarios of each condition of a suite are run, the first ones; or "all"."""
     contestants: tuple[str, ...] | None = None
     """Names of those who take part; all by default."""
+    members: int | Literal["all"] = 3
+    """How many agents of each learned contestant take part, lowest training seeds first; or
+    "all"."""
     agents: tuple[Path, ...] = ()
-    """Run folders or .safetensors files of further agents, run without and with the wrapper."""
-    sigma_rad: float = math.pi / 6
-    """Admissible swing σ."""
-    damping: float = 0.1
-    """Damping of the plant's beam in N·m·s/rad; the paper designs with 1.0 and simulates 0.1."""
+    """Run folders or .safetensors files of further agents, run without and with certificate."""
+    allow_pickle: bool = False
+    """Also take zip files of SB3 and rl_zoo3 as --agents, with the vecnormalize.pkl beside them.
+    Loading one runs whatever code its maker put in, with your rights: only for files you trust."""
+    jobs: int | None = None
+    """Processes; as many as cores by default, 1 stays in this one."""
     fresh: bool = False
     """Discard what an earlier run left in the output folder."""
 
     def __post_init__(self) -> None:
-        require_whole("episodes", self.episodes, 1)
-        require_positive("horizon_s", self.horizon_s, "s")
+        for name in self.suites:
+            require_choice("suites", name, (*SUITE_NAMES, _ALL))
+        for name in ("episodes", "members"):
+            value = getattr(self, name)
+            if value != _ALL:
+                require_whole(name, value, 1)
+        if self.jobs is not None:
+            require_whole("jobs", self.jobs, 1)
 
     @property
-    def environment(self) -> TransportConfig:
-        """The environment, with the paper's disturbances."""
-        return TransportConfig(
-            constraint_mode="cost",
-            sigma_rad=self.sigma_rad,
-            beam=BeamParams(damping=self.damping),
-            disturbance=PAPER_DISTURBANCE,
-        )
+    def chosen_suites(self) -> tuple[Suite, ...]:
+        """The suites in their own order, with the scenarios that are to be run."""
+        names = SUITE_NAMES if _ALL in self.suites else self.suites
+        whole = [suite_named(name) for name in SUITE_NAMES if name in names]
+        if self.episodes == _ALL:
+            return tuple(whole)
+        return tuple(suite.first(self.episodes) for suite in whole)
 
     @property
-    def step_count(self) -> int:
-        """Control periods until the horizon."""
-        return max(1, round(self.horizon_s / self.environment.task.control_period_s))
+    def member_limit(self) -> int | None:
+        """Largest number of members of a contestant; None for no limit."""
+        return None if self.members == _ALL else self.members
 
     @property
     def command(self) -> str:
@@ -66,8 +80,9 @@ class ComparisonConfig:
         words = ["python", "evaluate.py"]
         for field in fields(self):
             value = getattr(self, field.name)
-            if value == field.default or field.name == "fresh":
+            if value == field.default or field.name in ("fresh", "jobs"):
                 continue
-            values = value if isinstance(value, tuple) else (value,)
-            words += [f"--{field.name.replace('_', '-')}", *map(str, values)]
+            words.append(f"--{field.name.replace('_', '-')}")
+            if value is not True:
+                words += map(str, value if isinstance(value, tuple) else (value,))
         return shlex.join(words)

@@ -1,180 +1,297 @@
-"""Who takes part in the standard comparison, and what each knows."""
+"""Who takes part in a comparison, what each knows, and under which certificate each runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
-from defmanip_gym.baselines.learned.agents import load_agent
-from defmanip_gym.baselines.tanner import TannerController
-from defmanip_gym.params import DESIGN_DAMPING, BeamParams
+from defmanip_gym.baselines.learned.actor import MlpActor
+from defmanip_gym.baselines.learned.agents import (
+    is_sb3_zip,
+    load_agent,
+    load_family,
+    shipped_families,
+)
+from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
+from defmanip_gym.errors import AgentFileError
+from defmanip_gym.evaluation.colours import GUEST_COLOURS, family_colours
+from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
+from defmanip_gym.evaluation.controllers import (
+    ControllerSpec,
+    Learned,
+    Random,
+    Sb3Zip,
+    Tanner,
+    Zero,
+)
+from defmanip_gym.evaluation.entry import SOLE_MEMBER, Family
+from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.params import DESIGN_DAMPING
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
+from defmanip_gym.validation import require_choice
 
-Array = NDArray[np.float64]
+# The option that every controller gets; the paper's controller shows two more.
+CERTIFICATE_OPTION = "phase_plane"
+_ANALYTIC = ("tanner", "tanner/phase_plane", "tanner/l1", "tanner/tanner")
+_ACTION_SIZE = 3
+_WRAPPER_KNOWS = "the wrapper knows the nominal beam"
 
-SHIPPED_AGENT = "ppo"
 
-# Keeps a random policy's draws apart from those that sampled its start.
-_POLICY_SEED_OFFSET = 1_000_000_000
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """One of a contestant's controllers: of a learned one, the result of one training.
+
+    Attributes:
+        name: seed of the training; ``SOLE_MEMBER`` where there is none or nobody knows it.
+        controller: how to make it.
+    """
+
+    name: str
+    controller: ControllerSpec
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contestant:
-    """A controller in a comparison.
+    """A controller in a comparison, with the certificate that is enforced on it.
 
     Attributes:
         name: unique; a part after a slash names the certificate.
+        family: what kind of controller it is.
         description: one sentence for the report.
         privileged: what it knows beyond the observation.
         colour: of its lines in plots, ``#rrggbb``.
-        build: makes the controller for a batch of episodes, given their seeds.
-        certificate: enforced on it by the ν_max wrapper; None runs it without the wrapper.
+        members: its controllers; one unless it was trained several times.
+        certificate: enforced by the ν_max wrapper; None runs without the wrapper.
     """
 
     name: str
+    family: Family
     description: str
     privileged: str
     colour: str
-    build: Callable[[Sequence[int]], Controller]
+    members: tuple[Member, ...]
     certificate: Certificate | None = None
 
 
-class RandomPerEpisode:
-    """One random controller per episode, so that no episode's actions depend on its neighbours.
+class Certificates:
+    """Certificates for the nominal beam under ``TRANSPORT_CONDITIONS``, made when asked for."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, Certificate] = {}
+
+    def named(self, method: str) -> Certificate:
+        """Return the certificate of a method; the paper's is for its own design damping."""
+        if method not in self._made:
+            beam = NOMINAL_BEAM
+            if method == "tanner":
+                beam = replace(beam, damping=DESIGN_DAMPING)
+            self._made[method] = certify(beam, method=method, conditions=TRANSPORT_CONDITIONS)
+        return self._made[method]
+
+
+def standard_names() -> tuple[str, ...]:
+    """Return the names of the contestants of the standard comparison, in order."""
+    learned = (
+        name
+        for family in shipped_families()
+        for name in (family, f"{family}/{CERTIFICATE_OPTION}")
+    )
+    return ("zero", "random", *_ANALYTIC, *learned)
+
+
+def standard_contestants(
+    names: Sequence[str], certificates: Certificates, member_limit: int | None = None
+) -> tuple[Contestant, ...]:
+    """Return contestants of the standard comparison, in its order.
 
     Args:
-        seeds: of the episodes.
-    """
-
-    def __init__(self, seeds: Sequence[int]) -> None:
-        self._controllers = [RandomController(seed + _POLICY_SEED_OFFSET) for seed in seeds]
-
-    def predict(
-        self,
-        observation: Array,
-        state: State | None = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = False,
-    ) -> tuple[Array, State | None]:
-        """Return uniform actions in [-1, 1], (n, 3)."""
-        rows = zip(self._controllers, observation, strict=True)
-        return np.array([controller.predict(row)[0] for controller, row in rows]), state
-
-
-def default_contestants(beam: BeamParams, sigma_rad: float) -> tuple[Contestant, ...]:
-    """Return the contestants of the standard comparison.
-
-    Args:
-        beam: the plant's true beam; also what the analytic controllers know.
-        sigma_rad: σ, which the certificates guard.
+        names: of those wanted.
+        certificates: where theirs come from; no others are made.
+        member_limit: how many members of a learned contestant take part, lowest seeds first; all
+            by default.
 
     Raises:
-        CertificateError: σ or the beam leaves no room for a certificate.
+        ParameterError: an unknown name.
+        AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
-    design_beam = replace(beam, damping=DESIGN_DAMPING)
-    l1 = certify(beam, sigma_rad=sigma_rad, method="l1", conditions=TRANSPORT_CONDITIONS)
-    tanner = certify(
-        design_beam, sigma_rad=sigma_rad, method="tanner", conditions=TRANSPORT_CONDITIONS
-    )
-    return (
-        Contestant(
-            name="zero",
-            description="Asks for no acceleration; only the disturbance moves it.",
-            privileged="nothing",
-            colour="#8c8c8c",
-            build=lambda seeds: ZeroController(),
-        ),
-        Contestant(
-            name="random",
-            description="Draws uniform actions.",
-            privileged="nothing",
-            colour="#b08968",
-            build=RandomPerEpisode,
-        ),
-        Contestant(
-            name="tanner/tanner",
-            description=(
-                "The paper's cascade under the paper's bound, Eq. (18), for its design damping of "
-                f"{DESIGN_DAMPING:g} N·m·s/rad: grasp acceleration within "
-                f"{tanner.acceleration_bound:.2g} m/s². As in the paper the plant has less damping "
-                f"({beam.damping:g}), so this certificate is not proven for it."
-            ),
-            privileged="robot and beam parameters; a damping that is not the plant's",
-            colour="#1b3a6b",
-            build=lambda seeds: TannerController(beam=beam, certificate=tanner),
-            certificate=tanner,
-        ),
-        Contestant(
-            name="tanner/l1",
-            description=(
-                "The same cascade under the exact linear bound for the plant's own damping: grasp "
-                f"acceleration within {l1.acceleration_bound:.2g} m/s²."
-            ),
-            privileged="robot and beam parameters, the true damping among them",
-            colour="#2f7fc1",
-            build=lambda seeds: TannerController(beam=beam, certificate=l1),
-            certificate=l1,
-        ),
-        Contestant(
-            name="tanner/none",
-            description="The same cascade with neither certificate nor wrapper.",
-            privileged="robot and beam parameters",
-            colour="#45b5aa",
-            build=lambda seeds: TannerController(beam=beam),
-        ),
-        Contestant(
-            name="ppo",
-            description="The shipped PPO agent, trained in simulation without the disturbance.",
-            privileged="nothing; its training saw the true plant",
-            colour="#e07b39",
-            build=_shipped_agent,
-        ),
-        Contestant(
-            name="ppo/l1",
-            description="The same agent inside the ν_max wrapper with the l1 certificate.",
-            privileged="as ppo; the wrapper knows the beam's parameters",
-            colour="#b3293b",
-            build=_shipped_agent,
-            certificate=l1,
-        ),
+    known = standard_names()
+    for name in names:
+        require_choice("contestants", name, known)
+    return tuple(
+        _standard(name, certificates, member_limit) for name in known if name in set(names)
     )
 
 
-def agent_contestants(path: Path, beam: BeamParams, sigma_rad: float) -> tuple[Contestant, ...]:
-    """Return an agent of the user's, without and with the ν_max wrapper.
+def agent_contestants(
+    path: Path, certificates: Certificates, *, allow_pickle: bool = False
+) -> tuple[Contestant, Contestant]:
+    """Return an agent of the user's, without and with the certificate.
 
     Its name ends in a digest of the agent, so that records of another never pass for its own.
 
+    Args:
+        path: run folder or file.
+        certificates: where its certificate comes from.
+        allow_pickle: take SB3's zip files, too, which run whatever code their maker put in.
+
     Raises:
-        AgentFileError: the agent cannot be loaded.
-        CertificateError: σ or the beam leaves no room for a certificate.
+        AgentFileError: the agent cannot be loaded or does not fit the environment.
     """
-    agent = load_agent(path)
+    if allow_pickle and is_sb3_zip(path):
+        return _sb3_contestants(path, certificates)
+    actor = load_agent(path)
     folder = path.resolve() if path.is_dir() else path.resolve().parent
-    name = f"{folder.name}@{agent.digest}"
-    l1 = certify(beam, sigma_rad=sigma_rad, method="l1", conditions=TRANSPORT_CONDITIONS)
+    name = f"{folder.name}@{actor.digest}"
+    about = f"{actor.card.algorithm} agent made by `{actor.card.command}`"
+    plain = _learned(name, (actor,), None, about, GUEST_COLOURS[0], certificates)
+    option = f"{name}/{CERTIFICATE_OPTION}"
+    return plain, _learned(
+        option, (actor,), CERTIFICATE_OPTION, about, GUEST_COLOURS[1], certificates
+    )
+
+
+def _sb3_contestants(path: Path, certificates: Certificates) -> tuple[Contestant, Contestant]:
+    model = load_sb3_zip(path)
+    name = f"{path.stem}@{model.digest}"
+    _require_fit(name, model.observation_size, _ACTION_SIZE)
+    about = f"{model.algorithm.upper()} model of Stable-Baselines3 in {path}"
     plain = Contestant(
         name=name,
-        description=f"{agent.card.algorithm} agent made by `{agent.card.command}`.",
-        privileged="nothing; its training saw the true plant",
-        colour="#7a5195",
-        build=lambda seeds: agent,
+        family="learned",
+        description=f"{about}.",
+        privileged="what its training saw is not known",
+        colour=GUEST_COLOURS[0],
+        members=(Member(name=SOLE_MEMBER, controller=Sb3Zip(path.resolve(), model.digest)),),
     )
-    wrapped = replace(
+    return plain, replace(
         plain,
-        name=f"{name}/l1",
-        description="The same agent inside the ν_max wrapper with the l1 certificate.",
-        privileged="the wrapper knows the beam's parameters",
-        colour="#c77dba",
-        certificate=l1,
+        name=f"{name}/{CERTIFICATE_OPTION}",
+        description=f"{about}, inside the {CERTIFICATE_OPTION} certificate.",
+        privileged=f"{plain.privileged}; {_WRAPPER_KNOWS}",
+        colour=GUEST_COLOURS[1],
+        certificate=certificates.named(CERTIFICATE_OPTION),
     )
-    return plain, wrapped
 
 
-def _shipped_agent(seeds: Sequence[int]) -> Controller:
-    return load_agent(SHIPPED_AGENT)
+def _standard(name: str, certificates: Certificates, member_limit: int | None) -> Contestant:
+    base, _, method = name.partition("/")
+    if base in ("zero", "random"):
+        return _REFERENCES[base]
+    if base == "tanner":
+        return _tanner(name, method, certificates)
+    actors = load_family(base)[:member_limit]
+    about = f"Agents of the shipped family {base}, trained with {len(actors)} seeds"
+    colour = family_colours(base)[bool(method)]
+    return _learned(name, actors, method or None, about, colour, certificates)
+
+
+def _tanner(name: str, method: str, certificates: Certificates) -> Contestant:
+    certificate = certificates.named(method) if method else None
+    description, privileged, colour = _TANNER[method]
+    if certificate is not None:
+        description += f": grasp acceleration within {certificate.acceleration_bound:.2g} m/s²"
+    return Contestant(
+        name=name,
+        family="analytic",
+        description=f"{description}.",
+        privileged=privileged,
+        colour=colour,
+        members=(Member(name=SOLE_MEMBER, controller=Tanner(certificate)),),
+        certificate=certificate,
+    )
+
+
+def _learned(
+    name: str,
+    actors: Sequence[MlpActor],
+    method: str | None,
+    about: str,
+    colour: str,
+    certificates: Certificates,
+) -> Contestant:
+    for actor in actors:
+        _require_fit(name, actor.card.observation_size, actor.card.action_size)
+    certificate = certificates.named(method) if method else None
+    trained_in = actors[0].card.certificate
+    is_residual = actors[0].card.residual_authority_m_s2 is not None
+    # without enforcement the paper's controller under a residual still is the training's
+    below = certificate
+    if certificate is None and trained_in is not None:
+        below = certificates.named(trained_in)
+    knows = ["its training saw the nominal plant"]
+    if is_residual:
+        knows.append("the controller under it knows the nominal robot and beam")
+    if certificate is not None:
+        about += f", inside the {method} certificate"
+        knows.append(_WRAPPER_KNOWS)
+    return Contestant(
+        name=name,
+        family="learned",
+        description=f"{about}.",
+        privileged="; ".join(knows),
+        colour=colour,
+        members=tuple(
+            Member(
+                name=str(actor.card.seed),
+                controller=Learned(actor, below if is_residual else None),
+            )
+            for actor in actors
+        ),
+        certificate=certificate,
+    )
+
+
+def _require_fit(name: str, observation_size: int, action_size: int) -> None:
+    """Raise AgentFileError unless an agent takes the suites' observations and gives an action."""
+    layout = ObservationLayout(NOMINAL_BEAM.segment_count)
+    sizes = observation_size, action_size
+    if sizes != (layout.size, _ACTION_SIZE):
+        raise AgentFileError(
+            f"observation and action size of {name}",
+            sizes,
+            f"{(layout.size, _ACTION_SIZE)}, those of the suites' environment",
+            f"Use an agent for a beam of {NOMINAL_BEAM.segment_count} segment in task mode.",
+        )
+
+
+_REFERENCES = {
+    "zero": Contestant(
+        name="zero",
+        family="reference",
+        description="Asks for no acceleration; only disturbances move it.",
+        privileged="nothing",
+        colour="#8c8c8c",
+        members=(Member(name=SOLE_MEMBER, controller=Zero()),),
+    ),
+    "random": Contestant(
+        name="random",
+        family="reference",
+        description="Draws uniform actions.",
+        privileged="nothing",
+        colour="#b08968",
+        members=(Member(name=SOLE_MEMBER, controller=Random()),),
+    ),
+}
+
+# by certificate: description, what it knows, colour
+_NOMINAL_MODEL = "nominal robot and beam"
+_TANNER = {
+    "": ("The paper's controller without certificate", _NOMINAL_MODEL, "#45b5aa"),
+    "phase_plane": (
+        "The paper's controller under the largest bound that the nonlinear nominal beam allows",
+        _NOMINAL_MODEL,
+        "#1b3a6b",
+    ),
+    "l1": (
+        "The paper's controller under the exact bound of the linear model of the nominal beam",
+        _NOMINAL_MODEL,
+        "#2f7fc1",
+    ),
+    "tanner": (
+        "The paper's controller under the paper's own bound, Eq. (18), for its design damping of "
+        f"{DESIGN_DAMPING:g} N·m·s/rad (not proven for less)",
+        f"{_NOMINAL_MODEL}; a damping that is not the plant's",
+        "#8fa6c9",
+    ),
+}

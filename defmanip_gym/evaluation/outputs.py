@@ -10,113 +10,91 @@ from pathlib import Path
 
 from rich.console import Console
 
-from defmanip_gym.display import save_figure
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestants import Contestant
-from defmanip_gym.evaluation.plots import PLOTS
 from defmanip_gym.evaluation.records import EpisodeRecord
-from defmanip_gym.evaluation.report import Figure, Setting, embedded, write_report
-from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
-from defmanip_gym.evaluation.statistics import Summary, summarize
-from defmanip_gym.evaluation.table import terminal_table, write_csv
-from defmanip_gym.evaluation.traces import Trace, load_trace, trace_path
-from defmanip_gym.params import PAPER_DISTURBANCE
+from defmanip_gym.evaluation.report.exports import latex_table, markdown_table, write_csv
+from defmanip_gym.evaluation.report.page import Section, Setting, write_page
+from defmanip_gym.evaluation.report.section_builder import SectionBuilder
+from defmanip_gym.evaluation.report.terminal import terminal_table
+from defmanip_gym.evaluation.suites import HORIZON_S, suite_named
+from defmanip_gym.evaluation.timings import TIMING_FILE, read_timings
+from defmanip_gym.files import write_atomically
 
 TABLE_FILE, REPORT_FILE = "summary.csv", "report.html"
-TRACE_FOLDER, PLOT_FOLDER = "traces", "plots"
-_UNLIMITED_WIDTH = 500
+TABLE_FOLDER = "tables"
 
 
 def write_outputs(
     config: ComparisonConfig,
     contestants: Sequence[Contestant],
     records: Sequence[EpisodeRecord],
-) -> tuple[tuple[Summary, ...], Path]:
-    """Write table, plots and report of these contestants; return summaries and report's path."""
-    order = [contestant.name for contestant in contestants]
-    own = [record for record in records if record.contestant in order]
-    summaries = summarize(sorted(own, key=lambda record: order.index(record.contestant)))
-    write_csv(config.output / TABLE_FILE, summaries)
-    report = config.output / REPORT_FILE
-    write_report(
-        report,
-        summaries=summaries,
+) -> tuple[tuple[Section, ...], Path]:
+    """Write tables, plots and report of these contestants; return sections and report's path.
+
+    Raises:
+        RecordError: an episode is missing or there twice.
+    """
+    present = {record.suite for record in records}
+    builder = SectionBuilder(
+        output=config.output,
+        made_by=config.command,
         contestants=contestants,
-        figures=_figures(config.output, contestants, own),
-        settings=_settings(config),
-        versions=_versions(),
+        timings=read_timings(config.output / TIMING_FILE),
+    )
+    sections = tuple(
+        builder.build(suite, [record for record in records if record.suite == suite.name])
+        for suite in config.chosen_suites
+        if suite.name in present
+    )
+    write_csv(config.output / TABLE_FILE, {section.suite: section.rows for section in sections})
+    for section in sections:
+        stem = config.output / TABLE_FOLDER / section.suite
+        markdown = markdown_table(section.rows, config.command)
+        latex = latex_table(section.suite, section.rows, config.command)
+        write_atomically(stem.with_suffix(".md"), markdown.encode("utf-8"))
+        write_atomically(stem.with_suffix(".tex"), latex.encode("utf-8"))
+    report = config.output / REPORT_FILE
+    write_page(
+        report,
+        sections=sections,
+        contestants=contestants,
+        settings=_settings(),
         command=config.command,
     )
-    return summaries, report
+    return sections, report
 
 
-def print_results(console: Console, summaries: Sequence[Summary], report: Path) -> None:
-    """Print the table and where the report is."""
-    table = terminal_table(summaries)
-    # rather long lines than cells cut off, also where the output is not a terminal
-    unlimited = console.options.update(max_width=_UNLIMITED_WIDTH)
-    needed = console.measure(table, options=unlimited).maximum
-    wide = Console(file=console.file, width=max(needed, console.width))
-    wide.print(table)
+def print_results(console: Console, sections: Sequence[Section], report: Path) -> None:
+    """Print each suite's table and claims, and where the report is."""
+    for section in sections:
+        table = terminal_table(section.suite, section.rows)
+        # rather long lines than cells cut off, also where the output is not a terminal
+        unlimited = console.options.update(max_width=500)
+        needed = console.measure(table, options=unlimited).maximum
+        wide = Console(file=console.file, width=max(needed, console.width))
+        wide.print(table)
+        for claim in section.claims:
+            console.print(claim.text, highlight=False, markup=False)
+        console.print()
     console.print(f"Report: {report.resolve()}", soft_wrap=True, highlight=False)
 
 
-def _figures(
-    folder: Path, contestants: Sequence[Contestant], records: Sequence[EpisodeRecord]
-) -> list[Figure]:
-    """Draw what there are traces of."""
-    colours = {contestant.name: contestant.colour for contestant in contestants}
-    traces = _traces(folder / TRACE_FOLDER, list(colours), records)
-    if not traces:
-        return []
-    figures = []
-    for plot in PLOTS:
-        path = folder / PLOT_FOLDER / f"{plot.name}.png"
-        save_figure(path, plot.draw(traces, colours))
-        figures.append(embedded(plot, path.read_bytes()))
-    return figures
-
-
-def _traces(
-    folder: Path, contestants: Sequence[str], records: Sequence[EpisodeRecord]
-) -> list[Trace]:
-    """Return the traces of recorded episodes, scenarios in order and contestants within."""
-    scenarios = sorted({record.scenario for record in records})  # "paper" before "sampled-…"
-    paths = [
-        trace_path(folder, contestant, scenario)
-        for scenario in scenarios
-        for contestant in contestants
-    ]
-    return [load_trace(path) for path in paths if path.exists()]
-
-
-def _settings(config: ComparisonConfig) -> list[Setting]:
-    disturbance = PAPER_DISTURBANCE
-    last_seed = FIRST_EVALUATION_SEED + config.episodes - 1
+def _settings() -> list[Setting]:
+    config = suite_named("nominal").conditions[0].environment
+    sigma_rad = config.sigma_rad
+    packages = ("defmanip_gym", "mujoco", "gymnasium", "numpy", "scipy")
+    versions = [f"Python {platform.python_version()}", *(f"{p} {version(p)}" for p in packages)]
     return [
-        Setting(
-            name="Scenarios",
-            value=f"{config.episodes} for each contestant: the paper's start and "
-            f"{config.episodes - 1} sampled around it (seeds {FIRST_EVALUATION_SEED} to "
-            f"{last_seed}, none used in training)",
-        ),
-        Setting(name="Horizon", value=f"{config.horizon_s:g} simulated seconds"),
         Setting(
             name="Constraint",
-            value=f"|φ| ≤ σ = {config.sigma_rad:.4f} rad ({math.degrees(config.sigma_rad):.0f}°)",
+            value=f"|φ| ≤ σ = {sigma_rad:.4f} rad ({math.degrees(sigma_rad):.0f}°); exceeding it "
+            "does not end an episode, but such an episode is no success",
         ),
-        Setting(name="Damping of the beam", value=f"{config.damping:g} N·m·s/rad"),
         Setting(
-            name="Disturbance",
-            value=f"{disturbance.force_amplitude_n:g} sin t + {disturbance.force_bias_n:g} N at "
-            "the grasp, along each axis",
+            name="Limits",
+            value=f"{config.task.max_speed_m_s:g} m/s and {config.task.max_acceleration_m_s2:g} "
+            f"m/s² per axis for everybody; {HORIZON_S:g} simulated seconds",
         ),
-    ]
-
-
-def _versions() -> list[Setting]:
-    packages = ("defmanip_gym", "mujoco", "gymnasium", "numpy", "scipy")
-    return [
-        Setting(name="Python", value=platform.python_version()),
-        *(Setting(name=name, value=version(name)) for name in packages),
+        Setting(name="Versions", value=", ".join(versions)),
     ]

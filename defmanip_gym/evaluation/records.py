@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import RecordError
+from defmanip_gym.evaluation.entry import Family
 from defmanip_gym.validation import require_choice
 from defmanip_gym.version import __version__
 
@@ -19,8 +20,12 @@ class EpisodeRecord:
     """What is kept of one episode.
 
     Attributes:
+        suite: name.
+        scenario: name within the suite.
+        condition: of the plant; name within the suite.
         contestant: who controlled it.
-        scenario: name of its start.
+        family: ``"reference"``, ``"analytic"`` or ``"learned"``.
+        member: seed of the contestant's training, "-" of one that nobody trains.
         seed: of its randomness.
         start: (x, y, θ, q1, q2, φ), m and rad.
         outcome: ``"success"`` reached the goal without ever exceeding σ; ``"violation"`` exceeded
@@ -32,22 +37,29 @@ class EpisodeRecord:
         duration_s: simulated time until the episode ended.
         start_distance_m: grasp to goal at the start.
         final_distance_m: grasp to goal at the end.
+        speed_limit_m_s: of the task.
         peak_grasp_force_n: largest norm of the measured force at the grasp; it carries the object's
             weight too.
+        force_error_n: RMS of the measured grasp force minus Eq. (10) of the nominal object at the
+            command that took effect.
         energy_j: ∫|F·v| dt of the grasp force on the object and the grasp velocity.
         path_length_m: of the grasp.
         interventions: share of steps in which the ν_max wrapper changed the command; None
             without wrapper.
         mean_intervention_m_s2: mean change of the command over all steps; None without wrapper.
-        certificate_applies: whether the start meets the certificate's conditions; None without
-            wrapper.
+        certificate_applies: whether the certificate covers the plant's beam and this start, and
+            the condition keeps to what it takes for granted; None without wrapper.
         return_: undiscounted sum of rewards.
         package_version: of defmanip_gym.
         env_id: of the environment.
     """
 
-    contestant: str
+    suite: str
     scenario: str
+    condition: str
+    contestant: str
+    family: Family
+    member: str
     seed: int
     start: tuple[float, ...]
     outcome: Outcome
@@ -58,7 +70,9 @@ class EpisodeRecord:
     duration_s: float
     start_distance_m: float
     final_distance_m: float
+    speed_limit_m_s: float
     peak_grasp_force_n: float
+    force_error_n: float
     energy_j: float
     path_length_m: float
     interventions: float | None
@@ -67,6 +81,13 @@ class EpisodeRecord:
     return_: float
     package_version: str = __version__
     env_id: str = ENV_ID
+
+    @property
+    def score(self) -> float:
+        """Mean speed towards the goal as a share of the speed limit; zero without success."""
+        if not self.success or self.time_to_goal_s is None:
+            return 0.0
+        return self.start_distance_m / (self.time_to_goal_s * self.speed_limit_m_s)
 
     def to_row(self) -> dict[str, Any]:
         """Return the record as JSON values."""
@@ -87,10 +108,11 @@ class EpisodeRecord:
             if not _fits(value, _TYPES[name]):
                 raise RecordError(f"record field {name}", value, _TYPES[name], _REMEDY)
         require_choice("outcome", row["outcome"], get_args(Outcome), RecordError)
+        require_choice("family", row["family"], get_args(Family), RecordError)
         return EpisodeRecord(**{**row, "start": tuple(row["start"])})
 
 
-_REMEDY = "The file was edited or is another program's; use another output folder or --fresh."
+_REMEDY = "The file was edited or is another program's: delete it, and its episodes run again."
 _TYPES = {field.name: str(field.type) for field in fields(EpisodeRecord)}
 
 

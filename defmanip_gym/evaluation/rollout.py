@@ -1,8 +1,9 @@
-"""One controller on many scenarios, all in one batch."""
+"""One controller on many scenarios of one condition, all in one batch."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -13,20 +14,33 @@ from numpy.typing import NDArray
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
+from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
+from defmanip_gym.evaluation.course import CourseRecorder
+from defmanip_gym.evaluation.entry import Entry
+from defmanip_gym.evaluation.measures import episode_record
 from defmanip_gym.evaluation.records import EpisodeRecord
-from defmanip_gym.evaluation.scenarios import Scenario
-from defmanip_gym.evaluation.tally import EpisodeTally
-from defmanip_gym.evaluation.traces import Trace, TraceRecorder
+from defmanip_gym.evaluation.suites import Scenario
+from defmanip_gym.evaluation.traces import Trace, trace_of
+from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.validation import require_positive
+from defmanip_gym.wrappers.action_delay import ActionDelay
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Episode:
+    """What is kept of an episode; the trace only where it was wanted."""
+
+    record: EpisodeRecord
+    trace: Trace | None
+
+
 class AppliedActions(gymnasium.vector.VectorWrapper[Array, Array, Array, Array, Array]):
-    """Keeps the actions that arrive here: under the ν_max wrapper, those that it let through."""
+    """Keeps the actions that arrive here: those that take effect."""
 
     actions: Array
 
@@ -37,43 +51,52 @@ class AppliedActions(gymnasium.vector.VectorWrapper[Array, Array, Array, Array, 
 
 
 def rollout(
-    contestant: str,
+    entry: Entry,
     controller: Controller,
     scenarios: Sequence[Scenario],
     *,
     config: TransportConfig,
     horizon_s: float,
     certificate: Certificate | None = None,
+    delay_periods: int = 0,
     traced: Collection[str] = (),
-    on_finished: Callable[[EpisodeRecord, Trace | None], None],
-    on_step: Callable[[], None],
-) -> None:
+    nominal_beam: BeamParams = NOMINAL_BEAM,
+    num_threads: int = 0,
+) -> tuple[Episode, ...]:
     """Run a controller from every scenario's start; an episode's record depends on nothing else.
 
     Episodes that have ended stay in the batch with action zero and their last observation, and
     nothing of them counts any more.
 
     Args:
-        contestant: name for the records.
+        entry: who this is, for the records.
         controller: row i of its batches is scenario i throughout.
         scenarios: at least one.
         config: the environment; in ``constraint_mode="cost"`` exceeding σ does not end episodes.
         horizon_s: simulated time after which an episode times out.
         certificate: enforced by the ν_max wrapper; None runs without the wrapper.
+        delay_periods: control periods by which actions, certified ones too, take effect later.
         traced: names of scenarios whose time course is wanted.
-        on_finished: gets record and, if wanted, trace as soon as an episode has ended.
-        on_step: called after every control period of the batch.
+        nominal_beam: what force errors are measured against.
+        num_threads: physics threads, 0 for one per CPU.
+
+    Returns:
+        The episodes in the order of the scenarios.
     """
-    applied = AppliedActions(_environment(config, len(scenarios), horizon_s))
+    require_positive("horizon_s", horizon_s, "s")
+    steps = max(1, round(horizon_s / config.task.control_period_s))
+    transport = _environment(config, len(scenarios), steps, num_threads)
+    applied = AppliedActions(transport)
     env: gymnasium.vector.VectorEnv[Array, Array, Array] = applied
+    if delay_periods:
+        env = ActionDelay(env, delay_periods)
     if certificate is not None:
-        env = NuMaxVectorActionScaling(applied, certificate)
+        env = NuMaxVectorActionScaling(env, certificate)
     observation, info = env.reset(
         seed=[scenario.seed for scenario in scenarios],  # type: ignore[arg-type]
         options={"start": np.array([scenario.start for scenario in scenarios])},
     )
-    tally = EpisodeTally(observation, info, config)
-    traces = TraceRecorder(contestant, scenarios, traced, config)
+    courses = CourseRecorder(transport.engine, observation, info, steps)
     running = np.ones(len(scenarios), dtype=bool)
     episode_start, state = running.copy(), None
     try:
@@ -81,36 +104,38 @@ def rollout(
             actions, state = controller.predict(
                 observation, state, episode_start, deterministic=True
             )
+            actions = np.where(running[:, None], np.clip(actions, -1.0, 1.0), 0.0)
             episode_start = np.zeros_like(running)
-            before, margin = observation, info["constraint_margin"]
-            after, reward, terminated, truncated, info = env.step(
-                np.where(running[:, None], actions, 0.0)
-            )
-            observation = np.where(running[:, None], after, before)
-            traces.add(before, margin, applied.actions)
-            tally.add(running, observation, reward, info)
-            ended = running & np.logical_or(terminated, truncated)
-            running = running & ~ended
-            for index in np.flatnonzero(ended).tolist():
-                record = tally.record(index, contestant, scenarios[index])
-                last = observation, info["constraint_margin"], applied.actions
-                on_finished(record, traces.finish(index, *last))
-            on_step()
+            after, reward, terminated, truncated, info = env.step(actions)
+            observation = np.where(running[:, None], after, observation)
+            courses.add(running, actions, applied.actions, observation, reward, info)
+            running = running & ~np.logical_or(terminated, truncated)
     finally:
         env.close()
+    episodes = []
+    for index, scenario in enumerate(scenarios):
+        course = courses.course(index)
+        record = episode_record(course, entry, scenario, config, nominal_beam=nominal_beam)
+        wanted = scenario.name in traced
+        trace = trace_of(course, entry, scenario.name, config) if wanted else None
+        episodes.append(Episode(record=record, trace=trace))
+    return tuple(episodes)
 
 
-def _environment(config: TransportConfig, count: int, horizon_s: float) -> DeformTransportVectorEnv:
-    require_positive("horizon_s", horizon_s, "s")
+def _environment(
+    config: TransportConfig, count: int, steps: int, num_threads: int
+) -> DeformTransportVectorEnv:
     return DeformTransportVectorEnv(
         count,
-        max_episode_steps=max(1, round(horizon_s / config.task.control_period_s)),
+        max_episode_steps=steps,
         autoreset_mode=AutoresetMode.DISABLED,
+        num_threads=num_threads,
         control_mode=config.control_mode,
         constraint_mode=config.constraint_mode,
         sigma_rad=config.sigma_rad,
         robot=config.robot,
         beam=config.beam,
+        beam_ranges=config.beam_ranges,
         nominal_robot=config.nominal_robot,
         nominal_beam=config.nominal_beam,
         task=config.task,

@@ -1,113 +1,157 @@
-"""A file of records that is complete at every moment and knows which comparison it belongs to."""
+"""Files of records: one for each entry, whole or absent, and sure of what they were made with."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from defmanip_gym.errors import RecordError
+from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.files import write_atomically
+from defmanip_gym.version import __version__
 
 FORMAT = "defmanip_gym records"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+
+_REPEAT = "Delete this file to have its episodes run again; the others are kept."
 
 
 def fingerprint(configuration: Any) -> str:
     """Return the SHA-256 of a configuration made of JSON values, whatever its order of keys."""
     canonical = json.dumps(configuration, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(canonical.encode("utf-8")).hexdigest()
+    return _digest(canonical.encode())
 
 
-class RecordStore:
-    """Records as JSON lines under a header; opening it reads what an earlier run has finished.
+class RecordFolder:
+    """Reads and writes the records of entries as JSON lines under a header.
+
+    The header holds the package's version, a fingerprint of what the episodes depend on, and a
+    digest of the lines, so that a file which was cut, edited or made with other settings does not
+    pass for records of this comparison.
 
     Args:
-        path: of the file; its folder must exist.
-        fingerprint: of the comparison's configuration.
-
-    Raises:
-        RecordError: the file is damaged or belongs to another comparison.
+        root: of the files.
     """
 
-    def __init__(self, path: Path, fingerprint: str) -> None:
-        self.path = path
-        self._header = json.dumps(
-            {"format": FORMAT, "version": FORMAT_VERSION, "fingerprint": fingerprint}
-        )
-        _remove_leftovers(path)
-        self._records = self._read() if path.exists() else {}
+    def __init__(self, root: Path) -> None:
+        self.root = root
 
-    @property
-    def records(self) -> tuple[EpisodeRecord, ...]:
-        """All records in the order in which they were added."""
-        return tuple(self._records.values())
+    def path(self, entry: Entry) -> Path:
+        """Return where the records of an entry lie."""
+        return self.root / entry.suite / f"{entry.file_stem}.jsonl"
 
-    def finished(self, contestant: str) -> set[str]:
-        """Return the names of the scenarios that a contestant has finished."""
-        return {scenario for name, scenario in self._records if name == contestant}
-
-    def add(self, record: EpisodeRecord) -> None:
-        """Keep a record; when this returns it is on disk, and never half of it.
+    def read(self, entry: Entry, fingerprint: str) -> tuple[EpisodeRecord, ...]:
+        """Return the records of an entry, none if there is no file.
 
         Raises:
-            RecordError: there is one of this contestant and scenario already.
+            RecordError: the file is damaged or was made with other settings.
         """
-        self._insert(self._records, record)
-        rows = [json.dumps(kept.to_row(), allow_nan=False) for kept in self._records.values()]
-        write_atomically(self.path, "\n".join([self._header, *rows, ""]).encode("utf-8"))
-
-    def _read(self) -> dict[tuple[str, str], EpisodeRecord]:
-        text = self.path.read_text(encoding="utf-8", errors="replace")
-        whole, _, cut = text.rpartition("\n")
-        if not whole and self._header.startswith(cut):
-            return {}  # cut within the header: nothing was recorded yet
-        header, *lines = whole.split("\n")
-        self._check_header(header)
-        records: dict[tuple[str, str], EpisodeRecord] = {}
-        for number, line in enumerate(lines, start=2):
-            self._insert(records, EpisodeRecord.from_row(self._parsed(line, number)))
-        return records
-
-    def _check_header(self, line: str) -> None:
-        header = self._parsed(line, 1)
-        expected = json.loads(self._header)
-        if not isinstance(header, dict) or header.get("format") != FORMAT:
+        path = self.path(entry)
+        if not path.exists():
+            return ()
+        header, records = _read(path)
+        if header["package_version"] != __version__:
             raise RecordError(
-                "header", line[:80], f"that of {FORMAT!r}", f"{self.path} is no file of records."
+                f"package version of {path}",
+                header["package_version"],
+                f"{__version__}, which runs now",
+                "Records of different versions are not compared. Delete this file, choose another "
+                "output folder, or pass --fresh to discard them all.",
             )
-        if header != expected:
+        if header["fingerprint"] != fingerprint:
             raise RecordError(
                 "records",
-                str(self.path),
-                "records of this very comparison (same scenarios, horizon, plant, package version)",
-                "They were made with other settings: choose another output folder, or pass "
-                "--fresh to discard them.",
+                str(path),
+                "records of this very contestant, suite and task",
+                "They were made with another agent, certificate, suite or environment: delete "
+                "this file, choose another output folder, or pass --fresh to discard them all.",
             )
+        for record in records:
+            if (record.suite, record.contestant, record.member) != _key(entry):
+                raise RecordError(
+                    f"record in {path}",
+                    (record.suite, record.contestant, record.member),
+                    str(_key(entry)),
+                    f"The file was renamed. {_REPEAT}",
+                )
+        return records
 
-    def _parsed(self, line: str, number: int) -> Any:
-        try:
-            return json.loads(line)
-        except json.JSONDecodeError as error:
-            raise RecordError(
-                f"line {number} of {self.path}",
-                line[:80],
-                "one JSON object",
-                "The file is damaged: choose another output folder, or pass --fresh to discard it.",
-            ) from error
-
-    def _insert(self, records: dict[tuple[str, str], EpisodeRecord], record: EpisodeRecord) -> None:
-        key = record.contestant, record.scenario
-        if key in records:
-            raise RecordError(
-                "record", key, "one of each contestant and scenario", f"Check {self.path}."
-            )
-        records[key] = record
+    def write(self, entry: Entry, fingerprint: str, records: Sequence[EpisodeRecord]) -> None:
+        """Write the records of an entry; when this returns they are on disk, or none is."""
+        rows = [json.dumps(record.to_row(), allow_nan=False) for record in records]
+        body = "".join(f"{row}\n" for row in rows).encode()
+        header = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "package_version": __version__,
+            "fingerprint": fingerprint,
+            "digest": _digest(body),
+        }
+        write_atomically(self.path(entry), json.dumps(header).encode() + b"\n" + body)
 
 
-def _remove_leftovers(path: Path) -> None:
+def read_records(path: Path) -> tuple[EpisodeRecord, ...]:
+    """Return the records in a file, of whatever settings and version.
+
+    Raises:
+        RecordError: the file is damaged, was edited, or is another program's.
+    """
+    return _read(path)[1]
+
+
+def remove_leftovers(folders: Iterable[Path]) -> None:
     """Delete the temporary files of ``write_atomically`` that a killed process left behind."""
-    for leftover in path.parent.glob(f".{path.name}.????????"):
-        leftover.unlink(missing_ok=True)
+    for folder in folders:
+        for leftover in folder.glob("*/.*.????????"):
+            leftover.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> tuple[dict[str, Any], tuple[EpisodeRecord, ...]]:
+    """Return header and records of a file that is as it was written."""
+    try:
+        first, _, body = path.read_bytes().partition(b"\n")
+        header = json.loads(first)
+    except OSError as error:
+        raise RecordError("records", str(path), "a file that can be read", f"{error}.") from error
+    except ValueError as error:
+        raise _foreign(path, first) from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise _foreign(path, first)
+    if header.get("version") != FORMAT_VERSION or set(header) != _HEADER_FIELDS:
+        raise RecordError(
+            f"header of {path}",
+            header.get("version"),
+            f"version {FORMAT_VERSION} of {FORMAT!r}",
+            f"Another version of the package wrote it. {_REPEAT}",
+        )
+    if header["digest"] != _digest(body):
+        raise RecordError(
+            "records",
+            str(path),
+            "a file as it was written",
+            f"It was cut or edited. {_REPEAT}",
+        )
+    rows = [json.loads(line) for line in body.splitlines()]
+    return header, tuple(EpisodeRecord.from_row(row) for row in rows)
+
+
+_HEADER_FIELDS = {"format", "version", "package_version", "fingerprint", "digest"}
+
+
+def _foreign(path: Path, header: bytes) -> RecordError:
+    shown = header[:80].decode("utf-8", "replace")
+    return RecordError(
+        f"header of {path}", shown, f"that of {FORMAT!r}", f"It is no file of records. {_REPEAT}"
+    )
+
+
+def _key(entry: Entry) -> tuple[str, str, str]:
+    return entry.suite, entry.contestant, entry.member
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

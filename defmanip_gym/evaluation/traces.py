@@ -1,10 +1,10 @@
-"""Time courses of single episodes, for plots."""
+"""Time courses of single episodes, for plots and animations."""
 
 from __future__ import annotations
 
 import io
+import math
 import zipfile
-from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -14,59 +14,81 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import RecordError
+from defmanip_gym.evaluation.course import Course
+from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.readings import heading_error, position_from_goal
-from defmanip_gym.evaluation.scenarios import Scenario
 from defmanip_gym.files import write_atomically
 from defmanip_gym.observation import ObservationLayout
 
 Array = NDArray[np.float64]
 
+TRACE_FOLDER = "traces"
 SAMPLE_RATE_HZ = 25.0
+_STORED_TYPE = np.float32  # a tenth of a micrometre is enough to draw
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """One episode at 25 Hz, its last moment included; T samples.
+    """One episode at 25 Hz, its last moment included; T samples of N segments.
 
     Attributes:
+        suite: of the scenario.
         contestant: who controlled it.
+        member: which of the contestant.
         scenario: name of its start.
         time_s: (T,).
         largest_swing_rad: ‖z2‖∞, (T,).
-        swing_rad: φ of the first segment, (T,).
+        swing_rad: φ of each segment, (T, N).
+        swing_rate_rad_s: φ̇ of each segment, (T, N).
         margin_rad: σ − ‖z2‖∞, (T,).
         position_m: grasp relative to the goal in axes of the goal's heading, the end-effector
             error, (T, 3).
-        heading_rad: θ − θ_goal, (T,).
-        action_m_s2: task acceleration handed to the robot from here on, after any wrapper, in the
-            base frame, (T, 3).
+        heading_rad: θ − θ_goal in (−π, π], (T,).
+        base_pose: (x, y, θ) relative to the goal pose of the base, in its axes, θ without jumps,
+            (T, 3) m, m, rad.
+        joints_rad: (q1, q2), (T, 2).
+        requested_m_s2: task acceleration that the controller asked for from here on, base frame,
+            (T, 3).
+        action_m_s2: the one that took effect, after certificate and delay, (T, 3).
     """
 
+    suite: str
     contestant: str
+    member: str
     scenario: str
     time_s: Array
     largest_swing_rad: Array
     swing_rad: Array
+    swing_rate_rad_s: Array
     margin_rad: Array
     position_m: Array
     heading_rad: Array
+    base_pose: Array
+    joints_rad: Array
+    requested_m_s2: Array
     action_m_s2: Array
+
+    @property
+    def entry_stem(self) -> str:
+        """Contestant and member in file names."""
+        return f"{self.contestant.replace('/', '+')}.{self.member}"
 
     def save(self, folder: Path) -> Path:
         """Write the trace into a folder and return the file's path."""
         buffer = io.BytesIO()
-        arrays: dict[str, Any] = {
-            field.name: np.asarray(getattr(self, field.name)) for field in fields(self)
-        }
+        arrays: dict[str, Any] = {}
+        for field in fields(self):
+            value = np.asarray(getattr(self, field.name))
+            arrays[field.name] = value.astype(_STORED_TYPE) if value.ndim else value
         np.savez_compressed(buffer, **arrays)
-        path = trace_path(folder, self.contestant, self.scenario)
+        path = trace_path(folder, self.suite, self.contestant, self.member, self.scenario)
         write_atomically(path, buffer.getvalue())
         return path
 
 
-def trace_path(folder: Path, contestant: str, scenario: str) -> Path:
-    """Return where the trace of an episode lies."""
-    return folder / f"{contestant.replace('/', '-')}.{scenario}.npz"
+def trace_path(folder: Path, suite: str, contestant: str, member: str, scenario: str) -> Path:
+    """Return where the trace of an episode lies in the folder of traces."""
+    return folder / suite / f"{contestant.replace('/', '+')}.{member}.{scenario}.npz"
 
 
 def load_trace(path: Path) -> Trace:
@@ -82,80 +104,47 @@ def load_trace(path: Path) -> Trace:
         raise RecordError(
             "trace", str(path), "a trace written by a comparison", "Run it again with --fresh."
         ) from error
-    contestant, scenario = str(values.pop("contestant")), str(values.pop("scenario"))
-    return Trace(contestant=contestant, scenario=scenario, **values)
+    named = {name: str(value) for name, value in values.items() if not value.ndim}
+    arrays = {name: value.astype(np.float64) for name, value in values.items() if value.ndim}
+    return Trace(**named, **arrays)  # type: ignore[arg-type]
 
 
-class TraceRecorder:
-    """Collects the time courses of some episodes of a batch.
+def trace_of(course: Course, entry: Entry, scenario: str, config: TransportConfig) -> Trace:
+    """Return an episode's trace.
 
     Args:
-        contestant: who controls them.
-        scenarios: of the whole batch.
-        traced: names of those wanted.
+        course: what happened.
+        entry: who controlled it, in which suite.
+        scenario: name of its start.
         config: the environment's definition.
     """
+    task, layout = config.task, ObservationLayout(config.beam.segment_count)
+    last = len(course.reward)
+    stride = max(1, round(1.0 / (SAMPLE_RATE_HZ * task.control_period_s)))
+    moments = np.append(np.arange(0, last, stride), last)
+    periods = np.minimum(moments, last - 1)  # what went on until the end
+    observation, margin = course.observation[moments], course.margin_rad[moments]
+    return Trace(
+        suite=entry.suite,
+        contestant=entry.contestant,
+        member=entry.member,
+        scenario=scenario,
+        time_s=moments * task.control_period_s,
+        largest_swing_rad=config.sigma_rad - margin,
+        swing_rad=course.swing_rad[moments],
+        swing_rate_rad_s=course.swing_rate_rad_s[moments],
+        margin_rad=margin,
+        position_m=position_from_goal(observation, layout),
+        heading_rad=heading_error(observation, layout),
+        base_pose=_from_goal(course.base_pose[moments], task.goal[:3]),
+        joints_rad=layout.part(observation, "joints"),
+        requested_m_s2=course.requested[periods] * task.max_acceleration_m_s2,
+        action_m_s2=course.applied[periods] * task.max_acceleration_m_s2,
+    )
 
-    def __init__(
-        self,
-        contestant: str,
-        scenarios: Sequence[Scenario],
-        traced: Collection[str],
-        config: TransportConfig,
-    ) -> None:
-        names = [scenario.name for scenario in scenarios]
-        self._names = {i: name for i, name in enumerate(names) if name in traced}
-        self._contestant, self._task, self._sigma_rad = contestant, config.task, config.sigma_rad
-        self._layout = ObservationLayout(config.beam.segment_count)
-        self._rows: dict[int, list[Array]] = {index: [] for index in self._names}
 
-    def add(self, observation: Array, margin_rad: Array, actions: Array) -> None:
-        """Keep the samples of one control period.
-
-        Args:
-            observation: at its beginning, (n, size).
-            margin_rad: then, (n,).
-            actions: applied during it, normalized, (n, 3).
-        """
-        ids = list(self._rows)
-        if ids:
-            samples = self._samples(observation[ids], margin_rad[ids], actions[ids])
-            for index, sample in zip(ids, samples, strict=True):
-                self._rows[index].append(sample)
-
-    def finish(
-        self, index: int, observation: Array, margin_rad: Array, actions: Array
-    ) -> Trace | None:
-        """Return the trace of an episode that has just ended, None if it was not wanted.
-
-        The arguments are as for ``add``, now of its last moment.
-        """
-        rows = self._rows.pop(index, None)
-        if rows is None:
-            return None
-        one = slice(index, index + 1)
-        last = self._samples(observation[one], margin_rad[one], actions[one])
-        stride = max(1, round(1.0 / (SAMPLE_RATE_HZ * self._task.control_period_s)))
-        times = np.append(np.arange(0, len(rows), stride), len(rows))
-        values = np.concatenate((np.array(rows)[::stride], last))
-        return Trace(
-            contestant=self._contestant,
-            scenario=self._names[index],
-            time_s=times * self._task.control_period_s,
-            margin_rad=values[:, 0],
-            largest_swing_rad=self._sigma_rad - values[:, 0],
-            swing_rad=values[:, 1],
-            heading_rad=values[:, 2],
-            position_m=values[:, 3:6],
-            action_m_s2=values[:, 6:],
-        )
-
-    def _samples(self, observation: Array, margin_rad: Array, actions: Array) -> Array:
-        columns = (
-            margin_rad,
-            self._layout.part(observation, "swing")[:, 0],
-            heading_error(observation, self._layout),
-            position_from_goal(observation, self._layout),
-            actions * self._task.max_acceleration_m_s2,
-        )
-        return np.column_stack(columns)
+def _from_goal(pose: Array, goal: tuple[float, ...]) -> Array:
+    """Return planar poses (T, 3) relative to a goal pose, in its axes."""
+    dx, dy = pose[:, 0] - goal[0], pose[:, 1] - goal[1]
+    cosine, sine = math.cos(goal[2]), math.sin(goal[2])
+    return np.column_stack((cosine * dx + sine * dy, cosine * dy - sine * dx, pose[:, 2] - goal[2]))

@@ -11,10 +11,10 @@ import numpy as np
 from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.evaluation.records import EpisodeRecord
+from defmanip_gym.evaluation.conditions import Condition
+from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
-from defmanip_gym.evaluation.scenarios import Scenario
-from defmanip_gym.evaluation.traces import Trace
+from defmanip_gym.evaluation.suites import Scenario
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.reproduction.course import POSITION, SWING
 from defmanip_gym.reproduction.parts import Numbers, Part
@@ -124,20 +124,22 @@ def l1_transport(max_duration_s: float) -> Part:
     config = TransportConfig(
         constraint_mode="cost", sigma_rad=SIGMA_RAD, beam=beam, disturbance=PAPER_DISTURBANCE
     )
-    scenario = Scenario(name="paper", seed=0, start=config.task.start.center)
-    finished: list[tuple[EpisodeRecord, Trace | None]] = []
-    rollout(
-        "tanner/l1",
+    scenario = Scenario(
+        name="paper",
+        seed=0,
+        start=config.task.start.center,
+        condition=Condition(name="paper", disturbance=PAPER_DISTURBANCE),
+    )
+    (episode,) = rollout(
+        Entry(suite="reproduction", contestant="tanner/l1", family="analytic"),
         TannerController(beam=beam, certificate=certificate),
         [scenario],
         config=config,
         horizon_s=min(_L1_HORIZON_S, max_duration_s),
         certificate=certificate,
         traced=[scenario.name],
-        on_finished=lambda record, trace: finished.append((record, trace)),
-        on_step=lambda: None,
     )
-    record, trace = finished[0]
+    record, trace = episode.record, episode.trace
     assert trace is not None
     numbers: Numbers = {
         "acceleration_bound_m_s2": certificate.acceleration_bound,
@@ -148,8 +150,8 @@ def l1_transport(max_duration_s: float) -> Part:
         "final_heading_rad": float(trace.heading_rad[-1]),
         "interventions": record.interventions,
     }
-    names = ("time_s", "swing_rad", "position_m", "heading_rad")
-    return Part(numbers=numbers, arrays={name: getattr(trace, name) for name in names})
+    arrays = {name: getattr(trace, name) for name in ("time_s", "position_m", "heading_rad")}
+    return Part(numbers=numbers, arrays=arrays | {"swing_rad": trace.swing_rad[:, 0]})
 
 
 def physics_step_study(max_duration_s: float) -> Part:

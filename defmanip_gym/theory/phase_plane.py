@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
-from defmanip_gym.theory.chain import beam_links
+from defmanip_gym.theory.chain import Array, beam_links
 from defmanip_gym.theory.conditions import CertificateConditions, ParameterIntervals
 
 _LARGEST_ACCELERATION_M_S2 = 100.0
@@ -63,6 +63,50 @@ def one_hinge_limit(
         rtol=1e-6,
     )
     return max(float(limit * _ROUNDED_DOWN - 2 * _RESOLUTION), 0.0)
+
+
+def one_hinge_reachable_set(
+    beam: BeamParams,
+    acceleration_m_s2: float,
+    sigma_rad: float,
+    conditions: CertificateConditions,
+    box: ParameterIntervals,
+) -> tuple[Array, Array] | None:
+    """Return the edge of what the inputs can reach from the allowed starts, None if not within ±σ.
+
+    The edge is the half swing on which every input pushes outward and which ends as far out as it
+    began: after many of them the inputs reach no farther. Its mirror image −φ̇(−φ) is the other
+    half; between the two lies every motion.
+
+    Args:
+        beam: one segment.
+        acceleration_m_s2: bound on the forward acceleration.
+        sigma_rad: σ.
+        conditions: limits of lifting and turning, and of the initial state.
+        box: factors on the root's damping and stiffness.
+
+    Returns:
+        Angles, rad, and rates ≥ 0, rad/s, from left to right.
+    """
+    adversary = _Adversary(beam, acceleration_m_s2, conditions, box)
+    if not adversary.is_contained(sigma_rad):
+        return None
+    first = max(conditions.initial_swing_rad, _RESOLUTION)
+    begin = max(
+        float(adversary.half_swing(start, conditions.initial_swing_rate_rad_s)[0, -1])
+        for start in np.linspace(-first, first, 5)
+    )
+
+    def growth(amplitude: float) -> float:
+        return float(adversary.half_swing(-amplitude, 0.0)[0, -1]) - amplitude
+
+    begin = max(begin, first)
+    amplitude = begin
+    if begin < sigma_rad and growth(begin) > 0:
+        # at the exact limit σ itself is the amplitude, up to rounding
+        amplitude = sigma_rad if growth(sigma_rad) > 0 else brentq(growth, begin, sigma_rad)
+    angles, rates = adversary.half_swing(-amplitude, 0.0)
+    return angles, np.maximum(rates, 0.0)
 
 
 class _Adversary:
@@ -122,6 +166,23 @@ class _Adversary:
         return bool(
             conditions.initial_swing_rad <= sigma and conditions.initial_swing_rate_rad_s <= allowed
         )
+
+    def half_swing(self, phi: float, rate: float) -> Array:
+        """Return angles and rates, (2, T), from a state with φ̇ ≥ 0 until rest, all pushing out."""
+
+        def forwards(_: float, state: np.ndarray) -> tuple[float, float]:
+            return state[1], self.outward_acceleration(state[0], state[1])
+
+        curve = solve_ivp(
+            forwards,
+            (0.0, self._longest_half_swing()),
+            (phi, max(rate, _RESOLUTION)),
+            method="LSODA",
+            events=_comes_to_rest,
+            rtol=1e-9,
+            atol=1e-11,
+        )
+        return np.asarray(curve.y)
 
     def _longest_half_swing(self) -> float:
         """Return a time, s, in which the curve reaches −σ or comes to rest."""

@@ -17,6 +17,8 @@ from defmanip_gym.files import write_atomically
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.version import __version__
 
+LAST_AGENT = "last"  # beside RUN_AGENT, the best on the validation starts
+
 _CONFIG = "config.json"
 _CHECKPOINTS = "checkpoints"
 _KEPT_CHECKPOINTS = 2

@@ -29,10 +29,8 @@ from defmanip_gym.training.environments import make_evaluation_env, make_trainin
 from defmanip_gym.training.export import actor_modules, hidden_activation, residual_of, to_actor
 from defmanip_gym.training.hyperparameters import checked_hyperparameters, load_hyperparameters
 from defmanip_gym.training.model import build_model, callbacks_of
-from defmanip_gym.training.run_folder import RunFolder
+from defmanip_gym.training.run_folder import LAST_AGENT, RunFolder
 from defmanip_gym.training.validation_callback import ValidationCallback
-
-LAST_AGENT = "last"  # beside RUN_AGENT, the best on the validation starts
 
 
 def train(config: TrainConfig) -> Path:

@@ -131,7 +131,7 @@ class ActionScaling:
         """
         task, part = self._config.task, partial(self._layout.part, observation)
         awake = np.ones(len(observation), dtype=bool) if idle is None else ~idle
-        actions = _finite_numbers(actions, awake)
+        actions = finite_actions(actions, awake)
         velocity = part("grasp_velocity_b")
         heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
         w = np.clip(actions, -1.0, 1.0) * task.max_acceleration_m_s2
@@ -283,8 +283,18 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         }
 
 
-def _finite_numbers(actions: Any, awake: BoolArray) -> Array:
-    shape = (len(awake), 3)
+def finite_actions(actions: Any, awake: BoolArray, shape: tuple[int, ...] = (3,)) -> Array:
+    """Return the actions of a batch as numbers, (n, ...), zero where they do not matter.
+
+    Args:
+        actions: as given to an environment.
+        awake: whose action matters, (n,).
+        shape: of one action.
+
+    Raises:
+        ActionError: actions that are not finite or of another shape.
+    """
+    shape = (len(awake), *shape)
     try:
         values = np.array(actions, dtype=np.float64)
     except (TypeError, ValueError):

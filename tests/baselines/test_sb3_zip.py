@@ -1,15 +1,12 @@
 """SB3's zip files: refused unless allowed, and then run as the model acts."""
 
-import base64
-import json
-import os
 import sys
 import zipfile
 
-import gymnasium
 import numpy as np
 import pytest
 from sb3_contrib import TQC
+from sb3_models import Spaces, poisoned, saved
 from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
@@ -21,49 +18,9 @@ from defmanip_gym.errors import AgentFileError
 OBSERVATIONS = np.random.default_rng(0).normal(size=(5, 22))
 
 
-class Spaces(gymnasium.Env):
-    """Nothing but spaces."""
-
-    def __init__(self, observation_shape=(22,), limit=1.0):
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, observation_shape)
-        self.action_space = gymnasium.spaces.Box(-limit, limit, (3,))
-
-    def reset(self, *, seed=None, options=None):
-        return np.zeros(self.observation_space.shape, np.float32), {}
-
-    def step(self, action):
-        return self.reset()[0], 0.0, False, False, {}
-
-
-def saved(path, algorithm=PPO, env=None):
-    model = algorithm("MlpPolicy", env or Spaces(), device="cpu", policy_kwargs={"net_arch": [8]})
-    model.save(path)
-    return model
-
-
-class Payload:
-    """Unpickling it makes a file."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __reduce__(self):
-        return os.mkdir, (str(self.path),)
-
-
 def test_a_strangers_zip_runs_nothing_unless_allowed(tmp_path):
-    import cloudpickle
-
     path, trace = tmp_path / "model.zip", tmp_path / "it-ran"
-    saved(path)
-    with zipfile.ZipFile(path) as archive:
-        content = {name: archive.read(name) for name in archive.namelist()}
-    data = json.loads(content["data"])
-    pickled = base64.b64encode(cloudpickle.dumps(Payload(trace))).decode()
-    data["lr_schedule"] = {":type:": "x", ":serialized:": pickled}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, part in (content | {"data": json.dumps(data)}).items():
-            archive.writestr(name, part)
+    poisoned(path, trace)
     for load in (load_agent, load_controller):
         with pytest.raises(AgentFileError, match="--allow-pickle"):
             load(path)

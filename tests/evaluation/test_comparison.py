@@ -1,162 +1,213 @@
+"""Comparisons: resumed, parallel, interrupted, and refused where something is wrong."""
+
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
+import joblib
 import pytest
 from filelock import FileLock
 
-from defmanip_gym.baselines.controller import RandomController
-from defmanip_gym.baselines.learned.actor import MlpActor
-from defmanip_gym.baselines.learned.agents import load_agent
-from defmanip_gym.errors import CertificateError, ParameterError, RecordError
-from defmanip_gym.evaluation import comparison, outputs
+from defmanip_gym.errors import ParameterError, RecordError
+from defmanip_gym.evaluation import comparison, jobs, suites, workers
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
-from defmanip_gym.evaluation.contestants import (
-    RandomPerEpisode,
-    agent_contestants,
-    default_contestants,
-)
-from defmanip_gym.evaluation.store import RecordStore
-from defmanip_gym.params import BeamParams
+from defmanip_gym.evaluation.timings import read_timings
+from defmanip_gym.evaluation.traces import load_trace
 
 
 def config(folder, **changes):
     settings = {
         "output": folder / "out",
-        "episodes": 3,
-        "horizon_s": 0.2,
-        "contestants": ("zero", "tanner/none"),
+        "suites": ("nominal", "mismatch"),
+        "episodes": 1,
+        "contestants": ("zero", "tanner"),
+        "jobs": 1,
     }
     return ComparisonConfig(**(settings | changes))
 
 
 @pytest.fixture(autouse=True)
-def without_plots(monkeypatch):
-    """Plots have their own tests and take seconds."""
-    monkeypatch.setattr(outputs, "PLOTS", ())
+def short(monkeypatch):
+    """Episodes of a fifth of a second and two conditions a suite; outputs have their own tests."""
+    brief = tuple(
+        replace(
+            suite,
+            horizon_s=0.2,
+            scenarios=tuple(s for c in suite.conditions[:2] for s in suite.of(c)[:4]),
+        )
+        for suite in suites.SUITES
+    )
+    monkeypatch.setattr(suites, "SUITES", brief)
+    monkeypatch.setattr(comparison, "print_results", lambda *_: None)
+    monkeypatch.setattr(
+        comparison,
+        "write_outputs",
+        lambda config, contestants, records: (records, config.output / "report.html"),
+    )
+
+
+@pytest.fixture
+def recorded(monkeypatch):
+    """The records that the outputs were made of."""
+    records = []
+
+    def write(config, contestants, found):
+        records[:] = found
+        return (), config.output / "report.html"
+
+    monkeypatch.setattr(comparison, "write_outputs", write)
+    return records
 
 
 @pytest.fixture
 def started(monkeypatch):
-    """Names of contestant and scenario of every episode that was started."""
+    """Suite, contestant and scenario of every episode that was started."""
     names = []
 
-    def counting(contestant, controller, scenarios, **arguments):
-        names.extend((contestant, scenario.name) for scenario in scenarios)
-        original(contestant, controller, scenarios, **arguments)
+    def counting(job):
+        entry = job.entry
+        names.extend((entry.suite, entry.contestant, s.name) for s in job.suite.scenarios)
+        return jobs.run_job(job)
 
-    original = comparison.rollout
-    monkeypatch.setattr(comparison, "rollout", counting)
+    monkeypatch.setattr(workers, "run_job", counting)
     return names
 
 
-def interrupt_at(monkeypatch, count):
-    original, calls = RecordStore.add, []
-
-    def add(self, record):
-        calls.append(record)
-        if len(calls) == count:
-            raise KeyboardInterrupt
-        original(self, record)
-
-    monkeypatch.setattr(RecordStore, "add", add)
+def files(folder):
+    paths = (path for path in (folder / "records").rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
-def test_a_finished_comparison_is_not_run_again(tmp_path, started, capsys):
-    report = run_comparison(config(tmp_path))
-    assert len(started) == 6
-    report.unlink()
+def test_a_finished_comparison_is_not_run_again(tmp_path, started, recorded):
+    run_comparison(config(tmp_path))
+    assert len(started) == 2 * (1 + 2)
+    first = list(recorded)
     started.clear()
-    assert run_comparison(config(tmp_path)) == report
-    assert started == [] and report.exists()
-    assert "Success" in capsys.readouterr().out
+    run_comparison(config(tmp_path))
+    assert started == [] and recorded == first
+
+
+def test_records_are_in_order_and_paired(tmp_path, recorded):
+    run_comparison(config(tmp_path))
+    assert [(r.suite, r.contestant, r.scenario) for r in recorded] == [
+        (suite, contestant, scenario)
+        for suite, scenarios in (
+            ("nominal", ["nominal-00"]),
+            ("mismatch", ["damping-x0.1-00", "damping-x0.3-00"]),
+        )
+        for contestant in ("zero", "tanner")
+        for scenario in scenarios
+    ]
 
 
 def test_an_interrupted_comparison_goes_on_without_repeating(
     tmp_path, started, monkeypatch, capsys
 ):
+    def interrupted(job):
+        if job.entry.suite == "mismatch":
+            raise KeyboardInterrupt
+        return jobs.run_job(job)
+
     with monkeypatch.context() as patch:
-        interrupt_at(patch, 5)
+        patch.setattr(workers, "run_job", interrupted)
         with pytest.raises(SystemExit) as stop:
             run_comparison(config(tmp_path))
     assert stop.value.code == 130
-    assert "running the same command again" in capsys.readouterr().out
+    assert "running the same command again" in " ".join(capsys.readouterr().out.split())
     started.clear()
     run_comparison(config(tmp_path))
-    assert [name for name, _ in started] == ["tanner/none"] * 2
-    uninterrupted = config(tmp_path, output=tmp_path / "reference")
-    run_comparison(uninterrupted)
-    assert records(tmp_path / "out") == records(tmp_path / "reference")
+    assert {suite for suite, *_ in started} == {"mismatch"}
+    run_comparison(config(tmp_path, output=tmp_path / "reference"))
+    assert files(tmp_path / "out") == files(tmp_path / "reference")
 
 
-def records(folder):
-    lines = (folder / "records.jsonl").read_text().splitlines()
-    return sorted(lines)
-
-
-def test_contestants_can_join_later(tmp_path, started):
-    run_comparison(config(tmp_path, contestants=("zero",)))
+def test_contestants_suites_and_episodes_can_join_later(tmp_path, started, recorded):
+    run_comparison(config(tmp_path, contestants=("zero",), suites=("nominal",)))
+    run_comparison(config(tmp_path, suites=("nominal",)))
+    started.clear()
+    run_comparison(config(tmp_path, episodes=3))
+    assert ("nominal", "zero", "nominal-00") not in started
+    assert {("nominal", "zero", "nominal-02"), ("mismatch", "tanner", "damping-x0.3-02")} < set(
+        started
+    )
+    more = len(recorded)
     started.clear()
     run_comparison(config(tmp_path))
-    assert {name for name, _ in started} == {"tanner/none"}
+    assert started == [] and len(recorded) == 6 < more
+    run_comparison(config(tmp_path, output=tmp_path / "at once", episodes=3))
+    assert files(tmp_path / "out") == files(tmp_path / "at once")
 
 
-def test_other_settings_need_another_folder_or_fresh(tmp_path, started):
+def test_fresh_discards_results_and_nothing_else(tmp_path, started):
     run_comparison(config(tmp_path))
+    mine = tmp_path / "out" / "records" / "notes.txt"
+    mine.write_text("mine")
+    started.clear()
+    run_comparison(config(tmp_path, fresh=True))
+    assert len(started) == 6 and mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda b: b[: len(b) // 2], lambda b: b.replace(b"-00", b"-01")]
+)
+def test_a_damaged_file_is_named_and_the_other_work_kept(tmp_path, started, damage):
+    run_comparison(config(tmp_path))
+    path = tmp_path / "out" / "records" / "nominal" / "tanner.-.jsonl"
+    path.write_bytes(damage(path.read_bytes()))
+    before = files(tmp_path / "out")
+    started.clear()
+    with pytest.raises(RecordError, match=r"tanner\.-\.jsonl.*Delete this file"):
+        run_comparison(config(tmp_path))
+    assert started == [] and files(tmp_path / "out") == before
+    path.unlink()
+    run_comparison(config(tmp_path))
+    assert started == [("nominal", "tanner", "nominal-00")]
+
+
+def test_records_of_another_plant_need_another_folder_or_fresh(tmp_path, monkeypatch):
+    run_comparison(config(tmp_path))
+    longer = tuple(replace(suite, horizon_s=0.3) for suite in suites.SUITES)
+    monkeypatch.setattr(suites, "SUITES", longer)
     with pytest.raises(RecordError, match="--fresh"):
-        run_comparison(config(tmp_path, damping=0.2))
-    started.clear()
-    run_comparison(config(tmp_path, damping=0.2, fresh=True))
-    assert len(started) == 6
+        run_comparison(config(tmp_path))
+    run_comparison(config(tmp_path, fresh=True))
+
+
+def test_every_contestants_decisions_are_timed_once(tmp_path):
+    run_comparison(config(tmp_path, contestants=("zero", "tanner/l1")))
+    path = tmp_path / "out" / "timings.json"
+    first = read_timings(path)
+    assert set(first) == {"zero", "tanner/l1"} and min(first.values()) > 0
+    run_comparison(config(tmp_path))
+    assert read_timings(path)["zero"] == first["zero"] and "tanner" in read_timings(path)
+    path.write_text("nonsense")
+    run_comparison(config(tmp_path))
+    assert set(read_timings(path)) == {"zero", "tanner"}
+
+
+def test_the_first_two_scenarios_of_a_suite_are_traced(tmp_path):
+    run_comparison(config(tmp_path, episodes=3, suites=("nominal",), contestants=("tanner",)))
+    paths = sorted((tmp_path / "out" / "traces").rglob("*.npz"))
+    names = ["tanner.-.nominal-00.npz", "tanner.-.nominal-01.npz"]
+    assert [path.name for path in paths] == names
+    assert load_trace(paths[0]).time_s[-1] == pytest.approx(0.2)
 
 
 def test_bad_settings_are_refused(tmp_path):
     with pytest.raises(ParameterError, match="'tanner/l1'"):
         run_comparison(config(tmp_path, contestants=("tanner/l2",)))
-    with pytest.raises(ParameterError, match="episodes"):
-        config(tmp_path, episodes=0)
-    with pytest.raises(ParameterError, match="horizon_s"):
-        config(tmp_path, horizon_s=float("nan"))
-    with pytest.raises(CertificateError):
-        run_comparison(config(tmp_path, damping=0.0))
+    with pytest.raises(ParameterError, match="'mismatch'.*'all'"):
+        config(tmp_path, suites=("mismach",))
+    for name in ("episodes", "members", "jobs"):
+        with pytest.raises(ParameterError, match=name):
+            config(tmp_path, **{name: 0})
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_output_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "out").write_text("mine")
     with pytest.raises(RecordError, match="a folder that can be written"):
         run_comparison(config(tmp_path))
-
-
-def test_command_repeats_the_settings(tmp_path):
-    command = ComparisonConfig(episodes=20, contestants=("zero", "ppo"), fresh=True).command
-    assert command == "python evaluate.py --episodes 20 --contestants zero ppo"
-
-
-def test_contestants_have_their_own_names_and_colours():
-    contestants = default_contestants(BeamParams(), 0.5)
-    assert [contestant.name for contestant in contestants] == [
-        "zero",
-        "random",
-        "tanner/tanner",
-        "tanner/l1",
-        "tanner/none",
-        "ppo",
-        "ppo/l1",
-    ]
-    assert len({contestant.colour for contestant in contestants}) == len(contestants)
-    for contestant in contestants:
-        assert (contestant.certificate is not None) == (
-            "/" in contestant.name and not contestant.name.endswith("none")
-        )
-
-
-def test_random_actions_belong_to_the_episode():
-    both = RandomPerEpisode([5, 6]).predict(np.zeros((2, 19)))[0]
-    alone = RandomPerEpisode([6]).predict(np.zeros((1, 19)))[0]
-    np.testing.assert_array_equal(both[1], alone[0])
-    # not the numbers that sampled the start of the same seed
-    assert not np.array_equal(alone[0], RandomController(6).predict(np.zeros(19))[0])
 
 
 def test_a_second_comparison_in_the_same_folder_is_refused(tmp_path):
@@ -166,22 +217,29 @@ def test_a_second_comparison_in_the_same_folder_is_refused(tmp_path):
         run_comparison(settings)
 
 
-def test_agents_of_one_folder_name_stay_apart_and_new_weights_are_run_anew(tmp_path):
-    shipped = load_agent("ppo")
-    folders = [tmp_path / parent / "run" for parent in ("a", "b")]
-    for number, folder in enumerate(folders):
-        changed = replace(shipped.card, seed=number)
-        MlpActor(
-            changed,
-            weights=shipped._weights,
-            biases=shipped._biases,
-            observation_mean=shipped._mean,
-            observation_variance=shipped._variance,
-        ).save(folder / "agent")
-    beam, sigma = BeamParams(), 0.5
-    names = {agent_contestants(folder, beam, sigma)[0].name for folder in folders}
-    assert len(names) == 2
-    settings = config(tmp_path / "out", contestants=("zero",), agents=tuple(folders))
-    run_comparison(settings)
-    records = (settings.output / "records.jsonl").read_text().splitlines()[1:]
-    assert len(records) == settings.episodes * 5
+def test_command_repeats_the_settings():
+    settings = ComparisonConfig(suites=("all",), contestants=("zero", "ppo"), fresh=True, jobs=3)
+    assert settings.command == "python evaluate.py --suites all --contestants zero ppo"
+
+
+def test_all_means_everything():
+    settings = ComparisonConfig(suites=("all",), episodes="all", members="all")
+    assert settings.chosen_suites == suites.SUITES and settings.member_limit is None
+
+
+def test_a_backend_of_the_users_takes_the_jobs_over_with_the_same_records(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    here = config(tmp_path)
+    run_comparison(here)
+    there = config(tmp_path, output=tmp_path / "cluster", jobs=None)
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+        joblib.parallel_config(backend="dask"),
+    ):
+        run_comparison(there)
+        done = client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.task_prefixes))
+    assert done > 0
+    assert files(here.output) == files(there.output)

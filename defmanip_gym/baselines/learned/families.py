@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from defmanip_gym.baselines.learned.actor import TENSOR_SUFFIX, MlpActor, card_path, load_actor
@@ -69,7 +70,7 @@ def load_family(name: str, library: Path = SHIPPED) -> tuple[MlpActor, ...]:
                 f"{seed}, as in the file's name",
                 "Rename both files.",
             )
-    _check_alike(members, folder)
+    require_alike(members, folder)
     return members
 
 
@@ -102,8 +103,8 @@ def write_card(family: str, card: AgentCard, library: Path = SHIPPED) -> None:
         ) from error
 
 
-def _check_alike(members: tuple[MlpActor, ...], folder: Path) -> None:
-    """Members differ by their seed only, so that their scatter is the training's."""
+def require_alike(members: Sequence[MlpActor], folder: Path) -> None:
+    """Raise AgentFileError unless members differ by seed only: their scatter is training's."""
     for name in _ALIKE:
         values = {str(getattr(member.card, name)) for member in members}
         if len(values) > 1:

@@ -1,0 +1,1 @@
+"""``defmanip agents``: the shipped agents, their cards and their scores."""

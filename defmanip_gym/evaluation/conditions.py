@@ -1,0 +1,96 @@
+"""How the plant of a scenario differs from what controllers and certificates believe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams, DisturbanceParams, TaskParams
+from defmanip_gym.validation import require_instance, require_non_negative, require_positive
+
+# What every controller, the inner loop and the certificates believe to carry.
+NOMINAL_BEAM = BeamParams()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """A plant: factors on the nominal beam, disturbances, and how late actions arrive.
+
+    Attributes:
+        name: unique within a suite.
+        damping_factor: on the nominal beam's damping.
+        mass_factor: on its mass.
+        length_factor: on its length.
+        disturbance: forces at the grasp and sensor noise.
+        actuation_delay_s: by how much actions take effect later; whole control periods.
+
+    Raises:
+        ParameterError: a value out of range.
+    """
+
+    name: str
+    damping_factor: float = 1.0
+    mass_factor: float = 1.0
+    length_factor: float = 1.0
+    disturbance: DisturbanceParams = field(default_factory=DisturbanceParams)
+    actuation_delay_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("damping_factor", "mass_factor", "length_factor"):
+            require_positive(name, getattr(self, name))
+        require_instance("disturbance", self.disturbance, DisturbanceParams)
+        require_non_negative("actuation_delay_s", self.actuation_delay_s, "s")
+        period_s = TaskParams().control_period_s
+        if abs(self.delay_periods * period_s - self.actuation_delay_s) > 1e-9:
+            raise ParameterError(
+                "actuation_delay_s",
+                self.actuation_delay_s,
+                f"a whole multiple of the control period, {period_s:g} s",
+                "Actions arrive at the beginning of a period.",
+            )
+
+    @property
+    def delay_periods(self) -> int:
+        """The delay in control periods."""
+        return round(self.actuation_delay_s / TaskParams().control_period_s)
+
+    @property
+    def within_certificate_conditions(self) -> bool:
+        """Whether what differs besides the beam is provided for by ``TRANSPORT_CONDITIONS``.
+
+        Their acceleration errors are for what happens within a control period, before the wrapper
+        counters it (docs/derivations.md, section 5). A late command acts as a disturbance of its
+        own size, and noisy sensors leave open whether a start is within the initial swing. The beam
+        is ``Certificate.covers``' matter.
+        """
+        own, paper = self.disturbance, PAPER_DISTURBANCE
+        is_noisy = own.force_sensor_noise_n > 0 or own.swing_sensor_noise_rad > 0
+        is_slow = own.force_frequency_rad_s <= paper.force_frequency_rad_s
+        has_small_forces = (
+            abs(own.force_bias_n) <= abs(paper.force_bias_n)
+            and abs(own.force_amplitude_n) <= abs(paper.force_amplitude_n)
+            and (is_slow or own.force_amplitude_n == 0)
+        )
+        return self.delay_periods == 0 and not is_noisy and has_small_forces
+
+    @property
+    def beam(self) -> BeamParams:
+        """The beam that is really carried."""
+        return replace(
+            NOMINAL_BEAM,
+            damping=self.damping_factor * NOMINAL_BEAM.damping,
+            mass_kg=self.mass_factor * NOMINAL_BEAM.mass_kg,
+            length_m=self.length_factor * NOMINAL_BEAM.length_m,
+        )
+
+    @property
+    def environment(self) -> TransportConfig:
+        """The environment; exceeding σ is a cost there and does not end episodes."""
+        return TransportConfig(
+            constraint_mode="cost",
+            beam=self.beam,
+            # as by default the inner loop counts on no damping, but here on no other truth either
+            nominal_beam=replace(NOMINAL_BEAM, damping=0.0),
+            disturbance=self.disturbance,
+        )

@@ -1,0 +1,85 @@
+"""The report as one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from defmanip_gym.evaluation.contestants import Contestant
+from defmanip_gym.evaluation.report.animation import Animation
+from defmanip_gym.evaluation.report.columns import COLUMNS, Row
+from defmanip_gym.evaluation.report.figures import FigureGroup
+from defmanip_gym.evaluation.report.sentences import Claim
+from defmanip_gym.files import write_atomically
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A suite's part of the page.
+
+    Attributes:
+        suite: name.
+        description: of the suite.
+        size: how much was run, in words.
+        headline: who is best, in a few words.
+        claims: what may be said.
+        rows: of the table.
+        figures: in order.
+        animations: in order.
+    """
+
+    suite: str
+    description: str
+    size: str
+    headline: str
+    claims: tuple[Claim, ...]
+    rows: tuple[Row, ...]
+    figures: tuple[FigureGroup, ...]
+    animations: tuple[Animation, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """A line of the report's list of settings."""
+
+    name: str
+    value: str
+
+
+def write_page(
+    path: Path,
+    *,
+    sections: Sequence[Section],
+    contestants: Sequence[Contestant],
+    settings: Sequence[Setting],
+    command: str,
+) -> None:
+    """Write the report.
+
+    Args:
+        path: of the HTML file.
+        sections: one for each suite.
+        contestants: who took part.
+        settings: of the comparison, and versions of the software.
+        command: makes the same report again.
+    """
+    environment = Environment(
+        loader=PackageLoader("defmanip_gym.evaluation"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
+    html = environment.get_template("report.html.j2").render(
+        sections=sections,
+        contestants=contestants,
+        colours={contestant.name: contestant.colour for contestant in contestants},
+        columns=COLUMNS,
+        settings=settings,
+        command=command,
+    )
+    write_atomically(path, html.encode("utf-8"))

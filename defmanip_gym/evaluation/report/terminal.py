@@ -1,0 +1,45 @@
+"""A suite's table for the terminal: what a decision needs, a line for each contestant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich import box
+from rich.table import Table
+
+from defmanip_gym.evaluation.report.columns import (
+    NONE,
+    Cell,
+    Row,
+    estimate_cell,
+    rate_cell,
+    share_cell,
+)
+
+
+def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
+    """Return a table that fits into 120 columns."""
+    table = Table(box=box.SIMPLE_HEAD, title=f"Suite {suite}", title_justify="left")
+    table.add_column("Contestant", no_wrap=True, style="bold")
+    headings = ("Score IQM", "Success %", "Violation %", "Swing/σ", "Time s", "Interv. %", "ms")
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in rows:
+        summary, decision = row.summary, row.decision_time_s
+        largest, tail = summary.largest_swing_share, summary.swing_share_cvar.value
+        time_s = summary.time_to_goal_s
+        table.add_row(
+            summary.contestant,
+            _on_one_line(estimate_cell(summary.score["iqm"], 2)),
+            _on_one_line(rate_cell(summary.success)),
+            _on_one_line(rate_cell(summary.violation)),
+            f"{largest:.2f} ({tail:.2f})",
+            NONE if time_s is None else f"{time_s.value:.1f}",
+            share_cell(summary.interventions).value,
+            NONE if decision is None else f"{1e3 * decision:.2g}",
+        )
+    return table
+
+
+def _on_one_line(cell: Cell) -> str:
+    return f"{cell.value} [dim]{cell.note}[/]" if cell.note else cell.value

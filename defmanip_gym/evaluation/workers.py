@@ -1,0 +1,56 @@
+"""Where jobs run: in this process, in others of this machine, or in a joblib backend's cluster."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import joblib
+from joblib._parallel_backends import LokyBackend
+from joblib.parallel import get_active_backend
+
+from defmanip_gym.evaluation.jobs import Job, JobResult, run_job
+
+
+@contextmanager
+def running(jobs: Sequence[Job], processes: int | None) -> Iterator[Iterator[JobResult]]:
+    """Run jobs and give their results as they are done; whatever ends the block ends the workers.
+
+    Args:
+        jobs: in the order in which they are started.
+        processes: as many as cores by default; 1 runs them in this process. A backend chosen by
+            ``joblib.parallel_config`` decides itself.
+    """
+    backend, _ = get_active_backend()
+    arguments: dict[str, Any] = {}
+    if isinstance(backend, LokyBackend):
+        # Ctrl-C is for this process, which ends the others; this is for workers that come later
+        arguments = {"initializer": signal.signal, "initargs": (signal.SIGINT, signal.SIG_IGN)}
+    parallel = joblib.Parallel(
+        n_jobs=processes or -1, return_as="generator_unordered", batch_size=1, **arguments
+    )
+    with _sigint_ignored():
+        results = parallel(joblib.delayed(run_job)(job) for job in jobs)
+    try:
+        yield results
+    finally:
+        with warnings.catch_warnings():  # that some jobs were not waited for is the purpose
+            warnings.simplefilter("ignore")
+            results.close()
+
+
+@contextmanager
+def _sigint_ignored() -> Iterator[None]:
+    """Let processes that are started here ignore Ctrl-C from their very beginning."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,162 @@
+"""Make docs/results.md from what ``make benchmark`` ran: ``python docs/make_results.py``.
+
+It reads results/benchmark and runs nothing: records, tables and plots say it all.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+import sys
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from defmanip_gym.errors import RecordError
+from defmanip_gym.evaluation.analysis import analyse
+from defmanip_gym.evaluation.broken_certificates import broken_certificates
+from defmanip_gym.evaluation.records import EpisodeRecord
+from defmanip_gym.evaluation.report.columns import COLUMNS
+from defmanip_gym.evaluation.report.sentences import suite_claims
+from defmanip_gym.evaluation.store import read_records
+from defmanip_gym.evaluation.suites import SUITES, Suite
+
+DOCS = Path(__file__).parent
+BENCHMARK = DOCS.parent / "results" / "benchmark"
+IMAGES = "images/results"
+_MACHINES_OWN = "Decision"  # its column holds wall times
+_FIGURES = {
+    "forest": "Score (IQM) of each contestant, with 95 % intervals.",
+    "profiles": "Share of episodes that score above τ, for the best of each kind.",
+    "conditions": "Score (IQM) by condition, for the best of each kind, with 95 % intervals.",
+}
+
+_HEAD = """# Results
+
+Learned against analytic controllers on all suites, with all agents. `make benchmark` makes this
+page: it runs
+
+```sh
+{command}
+```
+
+and then `python docs/make_results.py`, which takes everything from there. What suites, numbers and
+intervals mean: [evaluation.md](evaluation.md). What each agent is: `defmanip agents`.
+
+How to read it: a contestant's part after the slash is the certificate that is enforced on it;
+without a slash there is none. Scores are mean speeds towards the goal as a share of the speed
+limit, 0 for an episode without success. A sentence names a winner only where intervals separate it
+from everybody else in its class. Small print in the tables: 95 % intervals.
+
+{certificates}
+"""
+
+
+def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
+    """Write the page with its images and return its path.
+
+    Args:
+        benchmark: output folder of a comparison.
+        docs: folder of the page.
+
+    Raises:
+        RecordError: the folder holds no whole comparison.
+    """
+    try:
+        rows = list(csv.DictReader((benchmark / "summary.csv").read_text("utf-8").splitlines()))
+        present = [suite for suite in SUITES if any(row["suite"] == suite.name for row in rows)]
+        folder = benchmark / "tables"
+        tables = {s.name: (folder / f"{s.name}.md").read_text("utf-8") for s in present}
+        command = re.search(r"^Made by `([^`]*)`", next(iter(tables.values())), re.M)
+    except (OSError, KeyError, StopIteration) as error:
+        raise RecordError(
+            "benchmark", str(benchmark), "the output folder of `make benchmark`", f"{error!r}."
+        ) from error
+    assert command is not None  # every table names it
+    order, records = {}, {}
+    for suite in present:
+        lines = [row for row in rows if row["suite"] == suite.name]
+        own = {row["contestant"]: int(row["episodes"]) for row in lines}
+        order[suite.name], records[suite.name] = list(own), _records(benchmark, suite, own)
+    parts = [_HEAD.format(command=command[1], certificates=_certificates(records.values()))]
+    for suite in present:
+        claims = suite_claims(
+            analyse(
+                records[suite.name],
+                suite.name,
+                order=order[suite.name],
+                certified=[name for name in order[suite.name] if "/" in name],
+            )
+        )
+        parts += [
+            f"## {suite.name}\n",
+            f"{suite.description}\n",
+            *(f"* {claim.text} {claim.detail}".rstrip() for claim in claims),
+            "",
+            *_figures(benchmark, docs, suite.name, command[1]),
+            _without_wall_times(tables[suite.name]),
+        ]
+    page = docs / "results.md"
+    page.write_text("\n".join(parts), encoding="utf-8")
+    return page
+
+
+def _records(
+    benchmark: Path, suite: Suite, episodes: Mapping[str, int]
+) -> list[EpisodeRecord]:
+    """Return the records that the tables are of; raise RecordError if there are others by now."""
+    paths = sorted((benchmark / "records" / suite.name).glob("*.jsonl"))
+    records = [record for path in paths for record in read_records(path)]
+    found = Counter(record.contestant for record in records)
+    for contestant, count in episodes.items():
+        if found[contestant] != count:
+            raise RecordError(
+                f"episodes of {contestant} in {benchmark / 'records' / suite.name}",
+                found[contestant],
+                f"{count}, as in the tables",
+                "Run `make benchmark` again; delete the records of members that are no more.",
+            )
+    return [record for record in records if record.contestant in episodes]
+
+
+def _certificates(suites: Iterable[Sequence[EpisodeRecord]]) -> str:
+    """Return what became of the certificates' promises, over all suites."""
+    records = [record for suite in suites for record in suite]
+    covered = sum(record.certificate_applies is True for record in records)
+    broken = len(broken_certificates(records))
+    return (
+        f"Certificates covered {covered} of {len(records)} episodes; σ was exceeded in "
+        f"{broken or 'none'} of them."
+    )
+
+
+def _figures(benchmark: Path, docs: Path, suite: str, command: str) -> list[str]:
+    """Copy the figures that matter and return their lines."""
+    folder = benchmark / "plots" / suite
+    second = "conditions" if (folder / "conditions.png").exists() else "profiles"
+    (docs / IMAGES).mkdir(parents=True, exist_ok=True)
+    lines = []
+    for name in ("forest", second):
+        target = f"{IMAGES}/{suite}-{name}.png"
+        shutil.copyfile(folder / f"{name}.png", docs / target)
+        lines += [f"![{_FIGURES[name]}]({target})\n", f"{_FIGURES[name]} Made by `{command}`.\n"]
+    return lines
+
+
+def _without_wall_times(table: str) -> str:
+    """Return a Markdown table without the column that depends on the machine."""
+    titles = [column.heading for column in COLUMNS]
+    place = 2 + titles.index(_MACHINES_OWN)  # after the line's beginning and the contestant
+    lines = []
+    for line in table.splitlines():
+        cells = re.split(r"(?<!\\)\|", line)
+        lines.append("|".join(cells[:place] + cells[place + 1 :]) if len(cells) > place else line)
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    try:
+        print(write_results())
+    except RecordError as error:
+        sys.exit(str(error))

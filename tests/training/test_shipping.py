@@ -1,0 +1,138 @@
+"""Shipping takes finished runs of committed sources, and all of them or none."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args
+
+import pytest
+import tyro
+from small_agents import small_agent
+
+from defmanip_gym.baselines.learned.agents import load_family, shipped_families
+from defmanip_gym.cli import main
+from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
+from defmanip_gym.errors import AgentFileError, RunFolderError
+from defmanip_gym.training.config import Recipe, TrainConfig
+from defmanip_gym.training.ship_config import ShipConfig
+from defmanip_gym.training.shipping import ship
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Make run folders as training leaves them."""
+
+    def make(seed=0, *, steps=100, certificate=None, **changes):
+        path = tmp_path / "runs" / f"{len(list(tmp_path.glob('runs/*')))}"
+        small_agent(seed=seed, total_timesteps=40, **changes).save(path / "agent")
+        small_agent(seed=seed, total_timesteps=steps, **changes).save(path / "last")
+        content = {
+            "train": {"total_timesteps": None, "certificate": certificate},
+            "hyperparameters": {"n_timesteps": 100},
+            "command": "python train.py",
+            "package_version": "0.1.0",
+            "git_revision": "0123456789ab",
+        }
+        (path / "config.json").write_text(json.dumps(content))
+        return path
+
+    return make
+
+
+@pytest.fixture
+def library(tmp_path):
+    return tmp_path / "library"
+
+
+def test_the_best_agents_of_runs_become_families(run, library):
+    runs = (
+        run(0),
+        run(3),
+        run(1, env_id="DeformTransportRandomized-v0"),
+        run(2, certificate="l1"),
+    )
+    names = ("ppo/seed-0", "ppo/seed-3", "ppo-randomized/seed-1", "ppo-l1/seed-2")
+    assert ship(ShipConfig(runs=runs, library=library)) == names
+    assert shipped_families(library) == ("ppo", "ppo-l1", "ppo-randomized")
+    assert [agent.card.seed for agent in load_family("ppo", library)] == [0, 3]
+    for name, path in zip(names, runs, strict=True):
+        for suffix in (".json", ".safetensors"):
+            original = (path / f"agent{suffix}").read_bytes()
+            assert (library / f"{name}{suffix}").read_bytes() == original
+
+
+def test_an_earlier_agent_is_replaced(run, library):
+    ship(ShipConfig(runs=(run(0),), library=library))
+    ship(ShipConfig(runs=(run(0, recipe="ppo", command="python train.py again"),), library=library))
+    (agent,) = load_family("ppo", library)
+    assert agent.card.command == "python train.py again"
+
+
+@pytest.mark.parametrize(
+    ("bad", "error", "said"),
+    [
+        ({"steps": 99}, RunFolderError, "--resume"),
+        ({"git_revision": "0123456789ab-dirty"}, RunFolderError, "commit"),
+        ({"git_revision": "unknown"}, RunFolderError, "commit"),
+        ({"seed": 0}, RunFolderError, "one run for ppo/seed-0"),
+        ({"hyperparameters": {"n_envs": 3}}, AgentFileError, "hyperparameters"),
+    ],
+)
+def test_one_bad_run_and_nothing_is_shipped(run, library, bad, error, said):
+    runs = (run(0), run(**({"seed": 1} | bad)))
+    with pytest.raises(error, match=said):
+        ship(ShipConfig(runs=runs, library=library))
+    assert not library.exists()
+
+
+def test_new_agents_must_go_with_those_that_stay(run, library):
+    ship(ShipConfig(runs=(run(0),), library=library))
+    other = run(1, hyperparameters={"n_envs": 3})
+    with pytest.raises(AgentFileError, match="hyperparameters"):
+        ship(ShipConfig(runs=(other,), library=library))
+    assert [agent.card.seed for agent in load_family("ppo", library)] == [0]
+
+
+def test_a_run_without_agent_and_no_run_at_all_are_refused(run, library, tmp_path):
+    path = run(0)
+    (path / "last.json").unlink()
+    with pytest.raises(AgentFileError, match="last"):
+        ship(ShipConfig(runs=(path,), library=library))
+    with pytest.raises(RunFolderError, match="train.py"):
+        ship(ShipConfig(runs=(tmp_path,), library=library))
+    with pytest.raises(RunFolderError, match="at least one"):
+        ShipConfig(runs=(), library=library)
+
+
+def test_the_command_says_what_it_shipped(run, library, monkeypatch, capsys):
+    words = ["defmanip", "ship", str(run(0)), str(run(1)), "--library", str(library)]
+    monkeypatch.setattr(sys, "argv", words)
+    main()
+    assert capsys.readouterr().out == "Shipped: ppo/seed-0\nShipped: ppo/seed-1\n"
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_agents_trains_and_ships_every_recipe_with_five_seeds():
+    answer = subprocess.run(
+        ["make", "--always-make", "--dry-run", "agents"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    lines = answer.stdout.splitlines()
+    commands = [shlex.split(line.partition("train.py")[2]) for line in lines if "train.py" in line]
+    configs = [tyro.cli(TrainConfig, args=words) for words in commands]
+    expected = {(recipe, ENV_ID, seed) for recipe in get_args(Recipe) for seed in range(5)}
+    expected |= {("ppo", RANDOMIZED_ENV_ID, seed) for seed in range(5)}
+    assert {(c.algo, c.env_id, c.seed) for c in configs} == expected and len(configs) == 30
+    (shipping,) = [shlex.split(line) for line in lines if "defmanip ship" in line]
+    folders = {f"runs/{env}-{recipe}-seed{seed}" for recipe, env, seed in expected}
+    assert set(shipping[2:]) == folders

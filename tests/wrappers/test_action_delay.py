@@ -1,0 +1,110 @@
+"""Late actuators: what arrives when, also across the ends of episodes."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+
+from defmanip_gym.errors import ActionError, ParameterError
+from defmanip_gym.params import BeamParams
+from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.wrappers.action_delay import ActionDelay
+from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
+
+ENV_ID = "defmanip_gym:DeformTransport-v0"
+
+
+class Arriving(gymnasium.vector.VectorWrapper):
+    """Keeps what arrives at the environment."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.actions = []
+
+    def step(self, actions):
+        self.actions.append(np.array(actions)[:, 0])
+        return self.env.step(actions)
+
+
+def delayed(periods, mode="Disabled", count=2, **arguments):
+    env = gymnasium.make_vec(
+        ENV_ID, num_envs=count, autoreset_mode=mode, constraint_mode="cost", **arguments
+    )
+    arriving = Arriving(env)
+    return ActionDelay(arriving, periods), arriving
+
+
+def send(env, *values):
+    for value in values:
+        env.step(np.tile(np.reshape(value, (-1, 1)), (env.num_envs // np.size(value), 3)))
+
+
+@pytest.mark.parametrize("periods", [0, 1, 3])
+def test_actions_arrive_that_many_periods_later_and_zeros_before(periods):
+    env, arriving = delayed(periods)
+    env.reset(seed=0)
+    send(env, 0.1, 0.2, 0.3, 0.4)
+    expected = ([0.0] * periods + [0.1, 0.2, 0.3, 0.4])[:4]
+    np.testing.assert_array_equal(np.array(arriving.actions)[:, 0], expected)
+
+
+def test_an_episode_that_is_reset_begins_with_nothing_on_its_way_and_the_others_go_on():
+    env, arriving = delayed(2)
+    env.reset(seed=0)
+    send(env, 0.1, 0.2)
+    env.reset(options={"reset_mask": np.array([True, False])})
+    send(env, 0.3, 0.4, 0.5)
+    np.testing.assert_array_equal(np.array(arriving.actions)[2:, 0], [0.0, 0.0, 0.3])
+    np.testing.assert_array_equal(np.array(arriving.actions)[2:, 1], [0.1, 0.2, 0.3])
+
+
+def test_episodes_reset_within_a_step_begin_with_nothing_on_their_way():
+    env, arriving = delayed(1, "SameStep", max_episode_steps=3)
+    env.reset(seed=0)
+    send(env, 0.1, 0.2, 0.3, 0.4, 0.5)  # the third step ends the first episodes
+    np.testing.assert_array_equal(np.array(arriving.actions)[:, 0], [0.0, 0.1, 0.2, 0.0, 0.4])
+
+
+def test_the_ignored_action_of_next_step_mode_never_arrives():
+    env, arriving = delayed(1, "NextStep", max_episode_steps=3)
+    env.reset(seed=0)
+    send(env, 0.1, 0.2, 0.3, np.nan, 0.5, 0.6)  # the fourth is ignored
+    arrived = np.array(arriving.actions)[[0, 1, 2, 4, 5], 0]
+    np.testing.assert_array_equal(arrived, [0.0, 0.1, 0.2, 0.0, 0.5])
+
+
+def test_a_certificate_around_it_bounds_what_arrives():
+    certificate = certify(BeamParams(), conditions=TRANSPORT_CONDITIONS)
+    env, arriving = delayed(3)
+    wrapped = NuMaxVectorActionScaling(env, certificate)
+    wrapped.reset(seed=0)
+    for _ in range(4):
+        wrapped.step(np.tile((1.0, 0.0, 0.0), (2, 1)))
+    share = certificate.acceleration_bound / 3.0
+    np.testing.assert_allclose(np.array(arriving.actions)[:, 0], [0, 0, 0, share])
+
+
+def test_what_callers_do_to_their_actions_afterwards_does_not_matter():
+    env, arriving = delayed(1)
+    env.reset(seed=0)
+    actions = np.full((2, 3), 0.1)
+    env.step(actions)
+    actions[:] = 0.9
+    env.step(actions)
+    assert arriving.actions[1][0] == 0.1
+
+
+def test_bad_actions_are_refused_at_once():
+    env, _ = delayed(3)
+    with pytest.raises(ResetNeeded):
+        env.step(np.zeros((2, 3)))
+    env.reset(seed=0)
+    for actions in (np.zeros((2, 2)), np.full((2, 3), np.nan), "abc"):
+        with pytest.raises(ActionError):
+            env.step(actions)
+
+
+@pytest.mark.parametrize("periods", [-1, 1.5, None])
+def test_impossible_delays_are_refused(periods):
+    with pytest.raises(ParameterError, match="periods"):
+        delayed(periods)
