@@ -18,7 +18,7 @@ from defmanip_gym.evaluation.analysis import analyse
 from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report.columns import COLUMNS
-from defmanip_gym.evaluation.report.sentences import suite_claims
+from defmanip_gym.evaluation.report.sentences import certificate_claim, suite_claims
 from defmanip_gym.evaluation.store import read_records
 from defmanip_gym.evaluation.suites import SUITES, Suite
 
@@ -81,14 +81,14 @@ def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
         order[suite.name], records[suite.name] = list(own), _records(benchmark, suite, own)
     parts = [_HEAD.format(command=command[1], certificates=_certificates(records.values()))]
     for suite in present:
-        claims = suite_claims(
-            analyse(
-                records[suite.name],
-                suite.name,
-                order=order[suite.name],
-                certified=[name for name in order[suite.name] if "/" in name],
-            )
+        analysis = analyse(
+            records[suite.name],
+            suite.name,
+            order=order[suite.name],
+            certified=[name for name in order[suite.name] if "/" in name],
         )
+        certificates = certificate_claim(records[suite.name])
+        claims = (*suite_claims(analysis), *filter(None, [certificates]))
         parts += [
             f"## {suite.name}\n",
             f"{suite.description}\n",

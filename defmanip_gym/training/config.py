@@ -59,10 +59,10 @@ class TrainConfig:
     hyperparameters: Path | None = None
     """YAML file in rl-zoo3's format; the package's own by default."""
 
-    evaluations: int = 20
-    """Evaluations and checkpoints over the run."""
+    evaluations: int = 30
+    """Evaluations on the validation starts, and checkpoints, over the run."""
 
-    evaluation_episodes: int = 32
+    evaluation_episodes: int = 64
     """Episodes per evaluation."""
 
     num_threads: int = 0

@@ -16,7 +16,7 @@ from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.validation import require_between, require_whole
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling, transport_config
 
-_EVALUATION_BATCH = 32
+_EVALUATION_BATCH = 64
 
 
 def make_training_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> VecNormalize:

@@ -7,6 +7,7 @@ from episodes import record
 from defmanip_gym.evaluation import comparison
 from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
+from defmanip_gym.evaluation.report.sentences import certificate_claim
 
 VIOLATION = {"outcome": "violation", "success": False, "violated": True}
 COVERED = {"contestant": "tanner/l1", "certificate_applies": True}
@@ -37,3 +38,11 @@ def test_a_comparison_says_how_many_broke_and_names_one(tmp_path, monkeypatch, c
 
 def test_a_comparison_without_one_says_nothing(tmp_path, monkeypatch, capsys):
     assert "broken" not in printed(FINE, tmp_path, monkeypatch, capsys)
+
+
+def test_the_report_says_whether_certificates_held():
+    assert certificate_claim([record(contestant="tanner")]) is None
+    held = certificate_claim(FINE).text
+    assert "held" in held and "all 1 episodes" in held
+    told = certificate_claim([*FINE, BROKEN]).text
+    assert "BROKEN" in told and "1 of 2" in told and "tanner/l1" in told

@@ -29,7 +29,7 @@ def test_horizon_of_value_is_the_files():
     gamma = yaml.safe_load((HYPERPARAMETERS / "ppo.yml").read_text())[ENV_ID]["gamma"]
     told, seconds = re.search(r"γ = ([\d.]+), ([\d.]+) s", PAGE).groups()
     assert float(told) == gamma
-    assert float(seconds) == pytest.approx(0.02 / (1 - gamma))
+    assert float(seconds) == pytest.approx(0.02 / (1 - gamma), abs=0.005)
 
 
 def test_randomized_environment_and_seeds_are_as_told():

@@ -165,7 +165,8 @@ COLUMNS = (
     Column(
         heading="Applies",
         unit="% of episodes",
-        legend="share of episodes whose beam and start the certificate covers; – without one",
+        legend="share of episodes that the certificate covers: their beam and start, and neither "
+        "late actuators, sensor noise nor forces beyond the paper's; – without one",
         cell=lambda row: share_cell(row.summary.certificate_applies),
     ),
     Column(

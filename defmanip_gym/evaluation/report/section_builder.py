@@ -14,7 +14,7 @@ from defmanip_gym.evaluation.report.columns import Row
 from defmanip_gym.evaluation.report.figures import FigureGroup, ReachableSets, SuiteFigures
 from defmanip_gym.evaluation.report.page import Section
 from defmanip_gym.evaluation.report.selection import best_of_each_kind, pairs_to_watch
-from defmanip_gym.evaluation.report.sentences import headline, suite_claims
+from defmanip_gym.evaluation.report.sentences import certificate_claim, headline, suite_claims
 from defmanip_gym.evaluation.suites import Suite
 from defmanip_gym.evaluation.traces import TRACE_FOLDER, Trace, load_trace, trace_path
 
@@ -58,7 +58,7 @@ class SectionBuilder:
             description=suite.description,
             size=_size(analysis),
             headline=headline(analysis.overall),
-            claims=suite_claims(analysis),
+            claims=(*suite_claims(analysis), *filter(None, [certificate_claim(records)])),
             rows=tuple(
                 Row(
                     summary=summary,

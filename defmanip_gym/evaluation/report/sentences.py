@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from defmanip_gym.evaluation.analysis import Duel, SuiteAnalysis
+from defmanip_gym.evaluation.broken_certificates import broken_certificates
+from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.statistics.intervals import Estimate
 from defmanip_gym.evaluation.statistics.paired import Difference
 from defmanip_gym.evaluation.statistics.summary import Summary
@@ -38,6 +40,21 @@ def suite_claims(analysis: SuiteAnalysis) -> tuple[Claim, ...]:
             detail = "" if duel.result.nobody_arrived else contrast_sentence(duel)
             claims.append(Claim(duel_sentence(who, duel.result), detail))
     return tuple(claims)
+
+
+def certificate_claim(records: Sequence[EpisodeRecord]) -> Claim | None:
+    """Return whether certificates kept their word where they apply; None if they apply nowhere."""
+    covered = sum(record.certificate_applies is True for record in records)
+    if not covered:
+        return None
+    broken = broken_certificates(records)
+    if not broken:
+        return Claim(f"Certificates held: σ was kept in all {covered} episodes that one covers.")
+    names = ", ".join(sorted({record.contestant for record in broken}))
+    return Claim(
+        f"CERTIFICATES BROKEN: σ was exceeded in {len(broken)} of {covered} episodes that one "
+        f"covers ({names})."
+    )
 
 
 def standing_sentence(who: str, standing: Standing, summaries: Mapping[str, Summary]) -> str:
