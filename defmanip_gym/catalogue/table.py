@@ -22,9 +22,8 @@ def agents_table(cards: Mapping[str, AgentCard]) -> Table:
     """Return one row per agent."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("agent", no_wrap=True)
-    table.add_column("algorithm")
-    table.add_column("environment")
-    table.add_column("steps", justify="right")
+    table.add_column("recipe", no_wrap=True)
+    table.add_column("steps", justify="right", no_wrap=True)
     table.add_column("certificate")
     table.add_column(f"success (%)\n{_LISTED_SUITE}", justify="right")
     table.add_column(f"score\n{_LISTED_SUITE}", justify="right")
@@ -32,9 +31,8 @@ def agents_table(cards: Mapping[str, AgentCard]) -> Table:
         score = card.scores.get(_LISTED_SUITE)
         table.add_row(
             escape(name),
-            card.algorithm,
-            card.env_id,
-            f"{card.total_timesteps:,}",
+            card.recipe,
+            f"{card.total_timesteps / 1e6:.2f} M",
             card.certificate or _NONE,
             _NONE if score is None else _success(score),
             _NONE if score is None else f"{score.score_iqm:.3f}",

@@ -14,7 +14,7 @@ from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.store import RecordFolder
 from defmanip_gym.evaluation.suites import Suite, suite_named
 
-_TRACED_SCENARIOS = 2  # the first of a suite, of a contestant's first member
+_TRACED_SCENARIOS = 2  # of a suite with a single condition; of others, one of each
 
 
 @dataclass(kw_only=True)
@@ -89,7 +89,7 @@ def _assignment(
             controller=member.controller,
             certificate=contestant.certificate,
             suite=replace(suite, scenarios=missing),
-            traced=tuple(s.name for s in whole.scenarios[:_TRACED_SCENARIOS]) if is_first else (),
+            traced=_traced(whole) if is_first else (),
             num_threads=threads,
         ),
         fingerprint=identity,
@@ -97,3 +97,10 @@ def _assignment(
         wanted=frozenset(scenario.name for scenario in suite.scenarios),
         done=done,
     )
+
+
+def _traced(suite: Suite) -> tuple[str, ...]:
+    """Return the names of the scenarios whose time courses are kept."""
+    conditions = suite.conditions
+    count = 1 if len(conditions) > 1 else _TRACED_SCENARIOS
+    return tuple(s.name for condition in conditions for s in suite.of(condition)[:count])

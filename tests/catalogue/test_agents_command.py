@@ -15,9 +15,11 @@ from defmanip_gym.cli import main
 
 @pytest.fixture
 def library(tmp_path):
-    """The shipped PPO agent with scores."""
+    """The first shipped PPO agent alone, with scores."""
     folder = tmp_path / "library"
-    shutil.copytree(SHIPPED / "ppo", folder / "ppo")
+    (folder / "ppo").mkdir(parents=True)
+    for path in (SHIPPED / "ppo").glob("seed-0.*"):
+        shutil.copy(path, folder / "ppo")
     card = load_agent("ppo").card
     score = SuiteScore(
         success_rate=0.96875,
@@ -44,7 +46,13 @@ def answer(monkeypatch, capsys):
 
 def test_the_shipped_agents_are_listed(answer):
     printed = answer()
-    assert "ppo/seed-0" in printed and "3,002,368" in printed and "DeformTransport-v0" in printed
+    assert "ppo/seed-0" in printed and "ppo/seed-4" in printed
+    assert f"{load_agent('ppo').card.total_timesteps / 1e6:.2f} M" in printed
+
+
+def test_the_list_fits_a_narrow_terminal(answer, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert "…" not in answer()
 
 
 def test_listed_success_has_its_wilson_interval(answer, library):
@@ -54,12 +62,13 @@ def test_listed_success_has_its_wilson_interval(answer, library):
 
 def test_a_card_is_shown_with_the_commands_that_repeat_it(answer, library):
     printed = answer("ppo/seed-0", "--library", library)
+    card = load_agent("ppo").card
     for part in (
         "learning_rate",
-        "lin_1.0e-3",
-        "20841bff4869",
+        card.hyperparameters["learning_rate"],
+        card.git_revision,
         "97 (89–99)",
-        "python train.py --algo ppo --seed 0\n",
+        f"{card.command}\n",
         "python evaluate.py --output results/agents --suites nominal --episodes all "
         "--contestants ppo\n",
         "defmanip agents --score results/agents\n",

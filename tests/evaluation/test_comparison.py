@@ -185,7 +185,14 @@ def test_every_contestants_decisions_are_timed_once(tmp_path):
     assert set(read_timings(path)) == {"zero", "tanner"}
 
 
-def test_the_first_two_scenarios_of_a_suite_are_traced(tmp_path):
+def test_one_scenario_of_each_condition_is_traced(tmp_path):
+    run_comparison(config(tmp_path, episodes=1, suites=("mismatch",), contestants=("tanner",)))
+    paths = (tmp_path / "out" / "traces").rglob("*.npz")
+    told = {path.name.split(".", 2)[2].removesuffix("-00.npz") for path in paths}
+    assert told == {condition.name for condition in suites.suite_named("mismatch").conditions}
+
+
+def test_two_scenarios_of_a_suite_with_one_condition_are_traced(tmp_path):
     run_comparison(config(tmp_path, episodes=3, suites=("nominal",), contestants=("tanner",)))
     paths = sorted((tmp_path / "out" / "traces").rglob("*.npz"))
     names = ["tanner.-.nominal-00.npz", "tanner.-.nominal-01.npz"]
