@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -91,6 +92,12 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
         mask = (options or {}).get("reset_mask")
         self._decide(observation, np.ones(self.num_envs, dtype=bool) if mask is None else mask)
         return observation, info
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Decisions until truncation."""
+        periods: int = self.unwrapped.max_episode_steps  # type: ignore[attr-defined]
+        return math.ceil(periods / self._decision_periods)
 
     def step(
         self, actions: Array

@@ -3,6 +3,7 @@
 import gymnasium
 import pytest
 
+from defmanip_gym.baselines.residual_action import ResidualVectorAction
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.training.validation_callback import ValidationCallback
 
@@ -23,6 +24,16 @@ def test_only_arrivals_without_violation_score_and_sooner_is_better(callback):
     for one in (episode(True, 250), episode(True, 250, cost=3.0), episode(False, 1000)):
         callback._log_success_callback(one, {})
     assert callback._episode_scores == [0.75, 0.0, 0.0]
+
+
+def test_decisions_that_are_held_count_against_decisions():
+    batch = gymnasium.make_vec("defmanip_gym:DeformTransport-v0", num_envs=1)
+    env = Sb3VecEnv(ResidualVectorAction(batch, decision_periods=25))
+    callback = ValidationCallback(env, episodes=1, interval=1, on_best=lambda: None)
+    callback._is_success_buffer = []
+    callback._log_success_callback(episode(True, 10), {})  # 10 of 40 decisions
+    assert callback._episode_scores == [0.75]
+    env.close()
 
 
 def test_a_checkpoint_keeps_the_best_score(callback):
