@@ -227,6 +227,8 @@ class RewardParams:
     distance_weight_per_m: float = 1.0
     course_weight_per_rad: float = 10.0
     closeness_weight: float = 5.0
+    approach_speed_per_m: float = 1.0
+    approach_swing_rad_per_m: float = 0.5
     time_cost_per_step: float = 0.02
     effort_weight: float = 0.001
     success_bonus: float = 10.0

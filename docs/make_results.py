@@ -102,9 +102,7 @@ def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
     return page
 
 
-def _records(
-    benchmark: Path, suite: Suite, episodes: Mapping[str, int]
-) -> list[EpisodeRecord]:
+def _records(benchmark: Path, suite: Suite, episodes: Mapping[str, int]) -> list[EpisodeRecord]:
     """Return the records that the tables are of; raise RecordError if there are others by now."""
     paths = sorted((benchmark / "records" / suite.name).glob("*.jsonl"))
     records = [record for path in paths for record in read_records(path)]

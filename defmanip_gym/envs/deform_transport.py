@@ -79,6 +79,8 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     d is the planar plus the vertical distance of the grasp to the goal, ψ the angle between the
     heading and the dipole streamline (Section VI) through the grasp, blended into the heading
     error at the goal, and e the Euclidean norm of the success errors, each over its tolerance.
+    In e, speed and swing count as far as they exceed what fits the distance left to the goal: 1 m/s
+    and 0.5 rad for each metre (`approach_speed_per_m`, `approach_swing_rad_per_m`).
 
     | Term               | Value (weights in `task.reward`)                                       |
     | ------------------ | ---------------------------------------------------------------------- |

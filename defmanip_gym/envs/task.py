@@ -66,6 +66,8 @@ class RewardWeights(NamedTuple):
     distance_weight_per_m: float
     course_weight_per_rad: float
     closeness_weight: float
+    approach_speed_per_m: float
+    approach_swing_rad_per_m: float
     time_cost_per_step: float
     effort_weight: float
     success_bonus: float
@@ -132,16 +134,21 @@ def potentials(state: TaskState, task: Task) -> Potentials:
 
     Distance and course pull from afar, the height on its own, lest it be left for last; closeness,
     logarithmic in the distance to the goal *set* counted in tolerances, still distinguishes
-    hovering near the goal from settling in it.
+    hovering near the goal from settling in it. Speed and swing that fit the way left cost nothing:
+    if they did, standing still before the goal would be closer to it than moving there.
     """
+    weights = task.weights
     height = abs(state.height_error_m)
     planar = math.sqrt(max(state.distance_m**2 - height**2, 0.0))
     position, speed, swing, heading = tolerance_shares(state, task)
+    moving = weights.approach_speed_per_m * state.distance_m / task.speed_tolerance_m_s
+    swinging = weights.approach_swing_rad_per_m * state.distance_m / task.swing_tolerance_rad
+    speed, swing = max(speed - moving, 0.0), max(swing - swinging, 0.0)
     away = math.sqrt(position**2 + speed**2 + swing**2 + heading**2)
     return Potentials(
-        distance=-task.weights.distance_weight_per_m * (planar + height),
-        course=-task.weights.course_weight_per_rad * state.course_error_rad,
-        closeness=-task.weights.closeness_weight * math.log1p(away),
+        distance=-weights.distance_weight_per_m * (planar + height),
+        course=-weights.course_weight_per_rad * state.course_error_rad,
+        closeness=-weights.closeness_weight * math.log1p(away),
     )
 
 

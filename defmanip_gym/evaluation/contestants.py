@@ -93,9 +93,7 @@ class Certificates:
 def standard_names() -> tuple[str, ...]:
     """Return the names of the contestants of the standard comparison, in order."""
     learned = (
-        name
-        for family in shipped_families()
-        for name in (family, f"{family}/{CERTIFICATE_OPTION}")
+        name for family in shipped_families() for name in (family, f"{family}/{CERTIFICATE_OPTION}")
     )
     return ("zero", "random", *_ANALYTIC, *learned)
 

@@ -67,9 +67,7 @@ class Counting:
 
 
 def test_a_decision_is_held_and_made_anew_where_an_episode_starts():
-    controller = ResidualController(
-        ZeroController(), Counting(), authority=1.0, decision_periods=3
-    )
+    controller = ResidualController(ZeroController(), Counting(), authority=1.0, decision_periods=3)
     state, held = None, []
     for step in range(7):
         start = np.array([False, step == 2])
@@ -130,7 +128,6 @@ def test_an_ending_amid_a_decision_is_told_with_its_last_observation_and_cost():
     assert info["final_info"]["cost"].tolist() == [0.0, 0.0]
     training.close()
     plain.close()
-
 
 
 def test_single_and_batched_wrapper_agree():

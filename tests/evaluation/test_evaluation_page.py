@@ -87,9 +87,7 @@ def test_the_script_for_a_cluster_runs_there(monkeypatch):
         lambda config: used.append(type(joblib.parallel.get_active_backend()[0]).__name__),
     )
     (script,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
-    with distributed.LocalCluster(
-        n_workers=1, processes=False, dashboard_address=None
-    ) as cluster:
+    with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster:
         script = script.replace('"tcp://scheduler:8786"', repr(cluster.scheduler_address))
         exec(compile(script, "evaluation.md", "exec"), {})
     assert used == ["DaskDistributedBackend"]

@@ -81,9 +81,7 @@ def animation(
             "segment": beam_length_m / traces[0].swing_rad.shape[1],
             "episodes": [_episode(trace, colours[trace.contestant]) for trace in traces],
         },
-        posters=tuple(
-            _poster(trace, colours[trace.contestant], beam_length_m) for trace in traces
-        ),
+        posters=tuple(_poster(trace, colours[trace.contestant], beam_length_m) for trace in traces),
     )
 
 
