@@ -1,4 +1,4 @@
-"""Physical and task parameters: frozen, keyword-only, validated when constructed.
+"""Physical parameters: frozen, keyword-only, validated when constructed.
 
 Units stand in the names (``_m``, ``_kg``, ``_s``, ``_rad``; dampings in N·m·s/rad, stiffnesses in
 N·m/rad). Every constructor raises :class:`~defmanip_gym.errors.ParameterError`.
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import (
     require_between,
-    require_finite_sequence,
     require_instance,
     require_non_negative,
     require_positive,
@@ -218,107 +217,6 @@ class BeamRanges:
             mass_kg=draw(self.mass_kg, beam.mass_kg),
             length_m=draw(self.length_m, beam.length_m),
         )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RewardParams:
-    """Weights of the reward terms; see the environment's documentation for their formulas."""
-
-    distance_weight_per_m: float = 1.0
-    course_weight_per_rad: float = 10.0
-    closeness_weight: float = 5.0
-    approach_speed_per_m: float = 1.0
-    approach_swing_rad_per_m: float = 0.5
-    time_cost_per_step: float = 0.02
-    effort_weight: float = 0.001
-    success_bonus: float = 10.0
-    failure_penalty: float = 10.0
-    deformation_penalty: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            require_non_negative(name, getattr(self, name))
-
-
-@dataclass(frozen=True, kw_only=True)
-class StartParams:
-    """Where episodes start: uniformly within ``spread`` of ``center``, at rest.
-
-    Both are (x, y, θ, q1, q2, φ); the center is the start of the paper's simulation.
-    """
-
-    center: tuple[float, ...] = (-8.5, 5.5, 0.0, math.pi / 3, -math.pi / 2, 0.0)
-    spread: tuple[float, ...] = (1.5, 1.5, 0.5, 0.1, 0.1, 0.05)
-
-    def __post_init__(self) -> None:
-        require_finite_sequence("center", self.center, 6)
-        require_finite_sequence("spread", self.spread, 6)
-        if min(self.spread) < 0:
-            raise ParameterError("spread", self.spread, "6 numbers >= 0", "Give half-widths.")
-
-    @property
-    def largest_swing_rad(self) -> float:
-        """The largest initial |φ| that sampling can give."""
-        return abs(self.center[5]) + self.spread[5]
-
-
-@dataclass(frozen=True, kw_only=True)
-class TaskParams:
-    """Goal, tolerances, limits and timing of the transport task.
-
-    ``goal`` is (x, y, θ, q1, q2, φ) as in the paper's Section VI.
-    """
-
-    goal: tuple[float, ...] = (0.0, 0.0, 0.0, math.pi / 2, -math.pi / 2, 0.0)
-    start: StartParams = field(default_factory=StartParams)
-    max_acceleration_m_s2: float = 3.0
-    max_speed_m_s: float = 2.0
-    position_tolerance_m: float = 0.05
-    speed_tolerance_m_s: float = 0.05
-    swing_tolerance_rad: float = 0.05
-    heading_tolerance_rad: float = 0.2
-    course_blend_radius_m: float = 0.3
-    arena_radius_m: float = 20.0
-    smallest_elbow_bend_rad: float = 0.15
-    smallest_reach_m: float = 0.25
-    smallest_grasp_height_m: float = 0.1
-    control_period_s: float = 0.02
-    physics_period_s: float = 0.005
-    reward: RewardParams = field(default_factory=RewardParams)
-
-    def __post_init__(self) -> None:
-        require_finite_sequence("goal", self.goal, 6)
-        require_instance("start", self.start, StartParams)
-        require_instance("reward", self.reward, RewardParams)
-        for name, unit in (
-            ("max_acceleration_m_s2", "m/s²"),
-            ("max_speed_m_s", "m/s"),
-            ("position_tolerance_m", "m"),
-            ("speed_tolerance_m_s", "m/s"),
-            ("swing_tolerance_rad", "rad"),
-            ("heading_tolerance_rad", "rad"),
-            ("course_blend_radius_m", "m"),
-            ("arena_radius_m", "m"),
-            ("smallest_reach_m", "m"),
-            ("smallest_grasp_height_m", "m"),
-            ("control_period_s", "s"),
-            ("physics_period_s", "s"),
-        ):
-            require_positive(name, getattr(self, name), unit)
-        require_between("smallest_elbow_bend_rad", self.smallest_elbow_bend_rad, 0.0, math.pi / 2)
-        ratio = self.control_period_s / self.physics_period_s
-        if ratio < 1 or abs(ratio - round(ratio)) > 1e-9:
-            raise ParameterError(
-                "control_period_s",
-                self.control_period_s,
-                f"a whole multiple of physics_period_s={self.physics_period_s}",
-                "Change one of the two periods.",
-            )
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps in one control period."""
-        return round(self.control_period_s / self.physics_period_s)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ PACKAGE = Path(defmanip_gym.__file__).parent
 LAYERS = [
     {"errors", "version", "files", "display", "compiled"},
     {"validation"},
-    {"params", "observation"},
+    {"params", "task_params", "observation"},
     {"theory", "plant"},
     {"objects"},
     {"attack"},

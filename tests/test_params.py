@@ -11,12 +11,10 @@ from defmanip_gym.params import (
     BeamRanges,
     DisturbanceParams,
     LinkParams,
-    RewardParams,
     RobotParams,
-    StartParams,
-    TaskParams,
     validated_sigma,
 )
+from defmanip_gym.task_params import RewardParams, StartParams, TaskParams
 
 NAN, INF = float("nan"), float("inf")
 POSITIVE = (0.0, -1.0, NAN, INF, None, "1")

@@ -17,7 +17,8 @@ from defmanip_gym.baselines.cascade import Cascade, GraspSample, LoopMemory
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.errors import CertificateError, GainError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import BeamParams, RobotParams, TaskParams
+from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.control_laws import ForceLoopGains
 from defmanip_gym.theory.frames import base_to_world

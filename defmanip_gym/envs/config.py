@@ -14,9 +14,9 @@ from defmanip_gym.params import (
     BeamRanges,
     DisturbanceParams,
     RobotParams,
-    TaskParams,
     validated_sigma,
 )
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_choice, require_instance
 

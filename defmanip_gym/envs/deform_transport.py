@@ -13,13 +13,8 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
-from defmanip_gym.params import (
-    BeamParams,
-    BeamRanges,
-    DisturbanceParams,
-    RobotParams,
-    TaskParams,
-)
+from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_choice
 
 Array = NDArray[np.float64]

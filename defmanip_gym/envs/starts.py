@@ -13,7 +13,7 @@ from defmanip_gym.compiled import compiled
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
-from defmanip_gym.params import StartParams
+from defmanip_gym.task_params import StartParams
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]

@@ -19,13 +19,8 @@ from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
 from defmanip_gym.errors import StartError
-from defmanip_gym.params import (
-    BeamParams,
-    BeamRanges,
-    DisturbanceParams,
-    RobotParams,
-    TaskParams,
-)
+from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_choice, require_whole
 
 Array = NDArray[np.float64]

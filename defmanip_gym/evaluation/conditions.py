@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
-from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams, DisturbanceParams, TaskParams
+from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams, DisturbanceParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_instance, require_non_negative, require_positive
 
 # What every controller, the inner loop and the certificates believe to carry.

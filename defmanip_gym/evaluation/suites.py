@@ -13,7 +13,8 @@ import numpy as np
 from defmanip_gym.envs.starts import PAPER_START, StartSampler
 from defmanip_gym.evaluation.conditions import Condition
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
-from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams, StartParams
+from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
+from defmanip_gym.task_params import StartParams
 from defmanip_gym.validation import require_choice, require_whole
 
 HORIZON_S = 60.0  # of every suite

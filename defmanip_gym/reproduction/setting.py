@@ -6,14 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.params import (
-    DESIGN_DAMPING,
-    PAPER_DISTURBANCE,
-    BeamParams,
-    DisturbanceParams,
-    StartParams,
-    TaskParams,
-)
+from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams, DisturbanceParams
+from defmanip_gym.task_params import StartParams, TaskParams
 from defmanip_gym.theory.certificates import certify
 from defmanip_gym.theory.control_laws import ForceLoopGains
 

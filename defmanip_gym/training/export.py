@@ -15,7 +15,8 @@ from defmanip_gym.baselines.learned.card import AgentCard
 from defmanip_gym.baselines.residual_action import ResidualAction, residual_authority
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import AgentFileError
-from defmanip_gym.params import BeamParams, TaskParams
+from defmanip_gym.params import BeamParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.training.hyperparameters import components
 

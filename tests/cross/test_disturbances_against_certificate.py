@@ -5,7 +5,8 @@ import pytest
 
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams, TaskParams
+from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.theory.frames import base_to_world
 from defmanip_gym.wrappers.action_delay import ActionDelay

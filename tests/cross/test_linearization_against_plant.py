@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from defmanip_gym.params import BeamParams, TaskParams
+from defmanip_gym.params import BeamParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.frames import base_to_world, world_to_base
 
 BEAM = BeamParams(damping=0.1)

@@ -7,7 +7,8 @@ import pytest
 
 from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.errors import GainError
-from defmanip_gym.params import BeamParams, RobotParams, TaskParams
+from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control_laws import ForceLoopGains
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH
 from defmanip_gym.theory.stability import SampledLoop

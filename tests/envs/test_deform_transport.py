@@ -15,14 +15,8 @@ from defmanip_gym.envs.deform_transport import DeformTransportEnv
 from defmanip_gym.envs.starts import PAPER_START
 from defmanip_gym.errors import ActionError, ParameterError, RenderingError, StartError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import (
-    PAPER_DISTURBANCE,
-    BeamParams,
-    DisturbanceParams,
-    RobotParams,
-    StartParams,
-    TaskParams,
-)
+from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams, DisturbanceParams, RobotParams
+from defmanip_gym.task_params import StartParams, TaskParams
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"
 

@@ -8,7 +8,8 @@ from gymnasium.vector import AutoresetMode
 from mujoco import batch as mujoco_batch
 
 from defmanip_gym.errors import ActionError, ParameterError, StartError
-from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, TaskParams
+from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams
+from defmanip_gym.task_params import TaskParams
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"
 RANGES = BeamRanges(damping=(0.05, 1.0), mass_kg=(2.5, 3.7))

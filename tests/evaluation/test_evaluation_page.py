@@ -17,7 +17,7 @@ from defmanip_gym.evaluation.statistics.aggregates import WORST_SHARE
 from defmanip_gym.evaluation.statistics.resampling import RESAMPLES
 from defmanip_gym.evaluation.store import _HEADER_FIELDS
 from defmanip_gym.evaluation.suites import HORIZON_S, SUITES
-from defmanip_gym.params import TaskParams
+from defmanip_gym.task_params import TaskParams
 
 PAGE = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
 CERTIFICATES = Certificates()

@@ -13,7 +13,8 @@ from defmanip_gym.evaluation.controllers import RandomPerEpisode
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import NOMINAL, Scenario, suite_named
-from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams, TaskParams
+from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 
 PAPER = Condition(name="paper", disturbance=PAPER_DISTURBANCE)

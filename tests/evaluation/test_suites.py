@@ -10,7 +10,8 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED, VALIDATION_SEED, training_seed
 from defmanip_gym.evaluation.suites import SUITE_NAMES, SUITES, suite_named
-from defmanip_gym.params import PAPER_DISTURBANCE, StartParams
+from defmanip_gym.params import PAPER_DISTURBANCE
+from defmanip_gym.task_params import StartParams
 
 # Another digest is another suite: old results cannot be compared with new ones.
 DIGESTS = {

@@ -18,7 +18,8 @@ from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.baselines.residual import ResidualController
 from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.errors import AgentFileError
-from defmanip_gym.params import BeamParams, TaskParams
+from defmanip_gym.params import BeamParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 
 __all__ = [
