@@ -91,6 +91,9 @@ def read_checkpoint(
                 for name in _REPLAY_FIELDS:
                     getattr(buffer, name)[: len(arrays[name])] = arrays[name]
             buffer.pos, buffer.full = int(state["replay_pos"]), bool(state["replay_full"])
+            # new episodes follow: returns over several steps must not reach into them
+            last = buffer.pos - 1
+            buffer.timeouts[last] = np.logical_or(buffer.timeouts[last], buffer.dones[last] == 0)
     except (OSError, ValueError, KeyError, RuntimeError, json.JSONDecodeError) as error:
         raise RunFolderError(
             "checkpoint", str(folder), "one written by this run", f"Cannot read it: {error}"

@@ -55,14 +55,20 @@ class Deaf:
         pass
 
 
-def sb3_actions(folder, config, observations):
-    """The actions of the run's last SB3 model, normalized as in training."""
+def last_model(folder, config):
+    """Return the run's last SB3 model and its normalization."""
     hyperparameters = load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
     venv = make_training_env(config, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
     checkpoint = training.RunFolder(folder).last_checkpoint()
     kept = json.loads((checkpoint / "state.json").read_text())["callbacks"]
     training.read_checkpoint(checkpoint, model, venv, [Deaf() for _ in kept])
+    return model, venv
+
+
+def sb3_actions(folder, config, observations):
+    """The actions of the run's last SB3 model, normalized as in training."""
+    model, venv = last_model(folder, config)
     return model.predict(venv.normalize_obs(observations), deterministic=True)[0]
 
 
@@ -100,6 +106,15 @@ def test_resumed_run_goes_on_from_its_checkpoint(algo, config):
     assert len(curves) == 2 and all(curve.stat().st_size > 0 for curve in curves)
     assert training.train(TrainConfig(resume=folder)) == folder  # finished: nothing to do
     assert sorted((folder / "curves").rglob("progress.csv")) == curves
+
+
+def test_returns_over_several_steps_end_where_a_run_was_interrupted(config):
+    settings = config("sac")
+    model, _ = last_model(training.train(settings), settings)
+    buffer = model.replay_buffer
+    assert buffer.n_steps > 1
+    assert (buffer.timeouts[buffer.pos - 1] | (buffer.dones[buffer.pos - 1] > 0)).all()
+    assert not buffer.timeouts[: buffer.pos - 1].any()
 
 
 def test_interrupted_run_keeps_its_state_and_says_how_to_go_on(config, monkeypatch, capsys):
