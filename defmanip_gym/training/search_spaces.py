@@ -35,6 +35,8 @@ def off_policy(trial: Trial) -> Overrides:
         "tau": trial.suggest_categorical("tau", [0.005, 0.01, 0.02]),
         "batch_size": trial.suggest_categorical("batch_size", [256, 512, 1024]),
         "gradient_steps": trial.suggest_categorical("gradient_steps", [2, 4, 8]),
+        "n_steps": trial.suggest_categorical("n_steps", [1, 3, 5]),
+        "target_entropy": trial.suggest_float("target_entropy", -3.0, 1.5),
     }
 
 
