@@ -59,7 +59,7 @@ class TrainConfig:
     hyperparameters: Path | None = None
     """YAML file in rl-zoo3's format; the package's own by default."""
 
-    evaluations: int = 30
+    evaluations: int = 15
     """Evaluations on the validation starts, and checkpoints, over the run."""
 
     evaluation_episodes: int = 64

@@ -1,5 +1,6 @@
 """rl_zoo3 trains from the package's hyperparameter files as they are."""
 
+import os
 import subprocess
 import sys
 
@@ -35,6 +36,8 @@ def test_rl_zoo3_accepts_the_file_unchanged(path, tmp_path):
         *("--conf-file", str(path), "--n-timesteps", "64", "--log-folder", str(tmp_path)),
         *("--eval-freq", "-1", "--seed", "0", "--hyperparams", *SHORT[algorithm]),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    # threads that wait for each other make seconds minutes where other processes run
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
     assert done.returncode == 0, done.stderr[-2000:]
     assert list(tmp_path.rglob(f"{ENV_ID}.zip"))
