@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import optuna
 import pytest
 import yaml
 
@@ -15,9 +16,11 @@ from defmanip_gym.envs.registration import (
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED, VALIDATION_SEED
 from defmanip_gym.training.config import ALGORITHM_OF
 from defmanip_gym.training.hyperparameters import HYPERPARAMETERS
+from defmanip_gym.training.search_spaces import SEARCH_SPACES
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "training.md").read_text()
+STUDY = PAGE.split("A study of `ppo`")[1]
 
 
 def test_every_recipe_has_its_row_with_its_algorithm():
@@ -37,6 +40,15 @@ def test_randomized_environment_and_seeds_are_as_told():
     assert RANDOMIZED_ENV_ID in PAGE and f"damping from {low} to {high}" in PAGE
     assert RANDOMIZED_MASS_SHARES == (0.8, 1.2) and "within ±20 %" in PAGE
     assert f"{VALIDATION_SEED:,}" in PAGE and f"{FIRST_EVALUATION_SEED:,}" in PAGE
+
+
+def test_the_study_is_of_the_search_space_as_it_is():
+    header, *trials = re.findall(r"^\| (\w+) \| ([\w.]+) \| (.*) \|$", STUDY, re.M)
+    trial = optuna.create_study().ask()
+    SEARCH_SPACES["ppo"](trial)
+    assert header[:2] == ("trial", "score") and header[2].split(" | ") == sorted(trial.params)
+    assert sorted(int(number) for number, *_ in trials) == list(range(len(trials)))
+    assert f"defmanip tune --trials {len(trials)} " in STUDY
 
 
 def test_links_lead_somewhere():
