@@ -20,7 +20,7 @@ _SHOWN_ELSEWHERE = ("normalization", "hyperparameters", "scores", "command")
 
 def agents_table(cards: Mapping[str, AgentCard]) -> Table:
     """Return one row per agent."""
-    table = Table(box=box.SIMPLE_HEAD)
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("agent", no_wrap=True)
     table.add_column("recipe", no_wrap=True)
     table.add_column("steps", justify="right", no_wrap=True)

@@ -44,8 +44,9 @@ def lagrangian(trial: Trial) -> Overrides:
     """Return PPO's changes and those of the dual ascent."""
     path = "defmanip_gym.training.lagrangian.LagrangianPenalty"
     options = {
-        "cost_limit": 0.0,
+        "cost_limit": 0.1,
         "multiplier": trial.suggest_float("multiplier", 0.01, 1.0, log=True),
+        "largest_multiplier": trial.suggest_float("largest_multiplier", 0.3, 10.0, log=True),
         "learning_rate": trial.suggest_float("multiplier_rate", 1e-3, 1e-1, log=True),
     }
     return on_policy(trial) | {"callback": [{path: options}]}

@@ -26,7 +26,7 @@ comparison.run_comparison(
         jobs=int(sys.argv[2]),
         suites=("all",),
         episodes=1,
-        contestants=("random",),
+        contestants=("zero", "random"),
     )
 )
 """
@@ -93,6 +93,8 @@ def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_p
     monkeypatch.setattr(comparison, "write_outputs", lambda *_: ((), here))
     monkeypatch.setattr(comparison, "print_results", lambda *_: None)
     comparison.run_comparison(
-        ComparisonConfig(output=here, jobs=1, suites=("all",), episodes=1, contestants=("random",))
+        ComparisonConfig(
+            output=here, jobs=1, suites=("all",), episodes=1, contestants=("zero", "random")
+        )
     )
-    assert files(there) == files(here) and len(files(here)) == 5
+    assert files(there) == files(here) and len(files(here)) == 10
