@@ -39,6 +39,8 @@ def start(output, processes):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # shells start background jobs with it ignored, and children inherit that
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
