@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 import numpy as np
@@ -24,6 +24,9 @@ from defmanip_gym.wrappers.nu_max_scaling import (
     NuMaxVectorActionScaling,
     transport_config,
 )
+
+if TYPE_CHECKING:
+    from defmanip_gym.envs.vector import DeformTransportVectorEnv
 
 Array = NDArray[np.float64]
 
@@ -96,8 +99,8 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
     @property
     def max_episode_steps(self) -> int:
         """Decisions until truncation."""
-        periods: int = self.unwrapped.max_episode_steps  # type: ignore[attr-defined]
-        return math.ceil(periods / self._decision_periods)
+        batch = cast("DeformTransportVectorEnv", self.unwrapped)
+        return math.ceil(batch.max_episode_steps / self._decision_periods)
 
     def step(
         self, actions: Array
