@@ -95,7 +95,9 @@ def scoring_commands(name: str, card: AgentCard) -> tuple[str, ...]:
         card: the agent's.
     """
     suites, episodes = _measured_on(card)
-    evaluation = ComparisonConfig(suites=suites, episodes=episodes, output=_SCORING_OUTPUT)
+    evaluation = ComparisonConfig(
+        suites=suites, episodes=episodes, members="all", output=_SCORING_OUTPUT
+    )
     family = name.partition("/")[0]
     if family not in shipped_families():
         return (replace(evaluation, agents=(Path(name),)).command,)

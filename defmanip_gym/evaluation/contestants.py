@@ -13,6 +13,7 @@ from defmanip_gym.baselines.learned.agents import (
     load_family,
     shipped_families,
 )
+from defmanip_gym.baselines.learned.card import AgentCard
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation.colours import GUEST_COLOURS, family_colours
@@ -35,6 +36,7 @@ from defmanip_gym.validation import require_choice
 CERTIFICATE_OPTION = "phase_plane"
 _ANALYTIC = ("tanner", "tanner/phase_plane", "tanner/l1", "tanner/tanner")
 _ACTION_SIZE = 3
+_OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance"})  # env_kwargs
 _WRAPPER_KNOWS = "the wrapper knows the nominal beam"
 
 
@@ -217,7 +219,7 @@ def _learned(
     below = certificate
     if certificate is None and trained_in is not None:
         below = certificates.named(trained_in)
-    knows = ["its training saw the nominal plant"]
+    knows = [_seen_in_training(actors[0].card)]
     if is_residual:
         knows.append("the controller under it knows the nominal robot and beam")
     if certificate is not None:
@@ -238,6 +240,12 @@ def _learned(
         ),
         certificate=certificate,
     )
+
+
+def _seen_in_training(card: AgentCard) -> str:
+    changed = sorted(_OF_THE_PLANT.intersection(card.hyperparameters.get("env_kwargs") or {}))
+    other = f" with another {', '.join(changed)}" if changed else ""
+    return f"its training saw the plant of {card.env_id}{other}"
 
 
 def _require_fit(name: str, observation_size: int, action_size: int) -> None:

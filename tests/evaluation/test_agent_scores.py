@@ -125,7 +125,7 @@ def test_the_command_that_measures_again_covers_what_the_card_lists(scores, suit
     evaluation, writing = scoring_commands("ppo/seed-0", card)
     config = tyro.cli(ComparisonConfig, args=shlex.split(evaluation)[2:])
     assert (config.suites, config.episodes) == (suites, episodes)
-    assert config.contestants == ("ppo",)
+    assert config.contestants == ("ppo",) and config.member_limit is None
     assert writing == f"defmanip agents --score {config.output}"
 
 

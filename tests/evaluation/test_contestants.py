@@ -69,6 +69,13 @@ def test_certificates_are_for_the_beam_that_everybody_believes(everyone):
             assert contestant.certificate.deformable.damping == damping
 
 
+def test_what_a_training_saw_is_its_environment(everyone):
+    for contestant in everyone:
+        if contestant.family == "learned":
+            is_randomized = contestant.name.startswith("ppo-randomized")
+            assert ("DeformTransportRandomized-v0" in contestant.privileged) == is_randomized
+
+
 def test_a_learned_contestant_has_a_member_for_each_seed(everyone):
     by_name = {contestant.name: contestant for contestant in everyone}
     for family in shipped_families():

@@ -84,13 +84,14 @@ def test_rates_of_members_that_differ_are_wider_than_wilsons():
     scores = np.full((5, 20), 0.4)
     scores[:2] = 0.0  # two members never arrive
     low, high = summary_of(table("ppo", scores)).success.interval
-    wilson = wilson_interval(60, 100)
+    wilson = wilson_interval(12, 20)
     assert low < wilson[0] - 0.1 and high > wilson[1] + 0.1
 
 
-def test_rates_of_members_that_agree_keep_wilsons_width():
+def test_rates_of_members_that_agree_are_as_uncertain_as_one_members():
     summary = summary_of(table("ppo", np.full((5, 20), 0.4)))
-    assert summary.success.interval == wilson_interval(100, 100)
+    assert summary.success.interval == wilson_interval(20, 20)
+    assert summary.success.trials == 100
 
 
 def test_retraining_alone_scatters_less_than_new_scenarios_too():

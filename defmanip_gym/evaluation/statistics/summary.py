@@ -39,9 +39,9 @@ from defmanip_gym.evaluation.statistics.scores import Scores
 class Summary:
     """One contestant in one suite. Intervals are the crossed bootstrap's unless said otherwise.
 
-    Rates carry the wider of Wilson's interval over all episodes and the bootstrap's: the former
-    takes episodes of several members on one scenario for independent, the latter has no width
-    where all members agree in every scenario.
+    Rates carry the wider of Wilson's interval and the bootstrap's, which has no width where all
+    members agree in every scenario. Wilson's trials are the scenarios: episodes of several members
+    on one are not independent.
 
     Attributes:
         contestant: name.
@@ -165,8 +165,10 @@ def _of_successes(
 
 def _rate(bootstrap: CrossedBootstrap, table: EpisodeTable, flags: Array) -> Rate:
     count = int(flags.sum())
-    low, high = wilson_interval(count, flags.size)
-    if len(flags) > 1:
+    members, scenarios = flags.shape
+    low, _ = wilson_interval(count // members, scenarios)
+    _, high = wilson_interval(-(-count // members), scenarios)
+    if members > 1:
         crossed = percentile_interval(bootstrap.draws(mean, Sample(table.contestant, flags)))
         if crossed is not None:
             low, high = min(low, crossed[0]), max(high, crossed[1])
