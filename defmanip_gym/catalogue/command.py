@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -32,7 +33,7 @@ def run_agents(config: AgentsConfig) -> None:
     else:
         cards = _cards(config)
         if config.json:
-            _print_json([_content(name, card) for name, card in cards.items()])
+            _print_json([_content(name, card, config.library) for name, card in cards.items()])
         else:
             console.print(agents_table(cards))
 
@@ -49,18 +50,20 @@ def _cards(config: AgentsConfig) -> dict[str, AgentCard]:
 def _show(name: str, config: AgentsConfig, console: Console) -> None:
     card = load_agent(name, config.library).card
     if config.json:
-        _print_json(_content(name, card))
+        _print_json(_content(name, card, config.library))
         return
     console.print(card_table(name, card))
     if card.scores:
         console.print(scores_table(card))
     # plain, so that no line break or markup gets into what is to be copied
-    print("Train it again:", card.command, sep="\n  ")
-    print("Measure its scores again:", *scoring_commands(name, card), sep="\n  ")
+    print(f"Train it again, at revision {card.git_revision}:", card.command, sep="\n  ")
+    commands = scoring_commands(name, card, config.library)
+    print("Measure its scores again:", *commands, sep="\n  ")
 
 
-def _content(name: str, card: AgentCard) -> dict[str, Any]:
-    return {"name": name, **asdict(card), "scoring_commands": scoring_commands(name, card)}
+def _content(name: str, card: AgentCard, library: Path) -> dict[str, Any]:
+    commands = scoring_commands(name, card, library)
+    return {"name": name, **asdict(card), "scoring_commands": commands}
 
 
 def _print_json(content: Any) -> None:

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from defmanip_gym.baselines.learned.actor import MlpActor
+from defmanip_gym.baselines.learned.actor import TENSOR_SUFFIX, MlpActor
 from defmanip_gym.baselines.learned.card import AgentCard, SuiteScore
 from defmanip_gym.baselines.learned.families import (
     SHIPPED,
@@ -87,20 +87,26 @@ def write_scores(results: Path, library: Path = SHIPPED) -> tuple[str, ...]:
     return tuple(written)
 
 
-def scoring_commands(name: str, card: AgentCard) -> tuple[str, ...]:
+def scoring_commands(name: str, card: AgentCard, library: Path = SHIPPED) -> tuple[str, ...]:
     """Return the shell commands that measure an agent's scores again and write them.
 
+    Only shipped agents' are written; others are measured beside the paper's controller.
+
     Args:
-        name: of a shipped family or member such as ``"ppo/seed-0"``, or a path.
+        name: of a family or member such as ``"ppo/seed-0"``, or a path.
         card: the agent's.
+        library: folder of families, the package's own by default.
     """
     suites, episodes = _measured_on(card)
     evaluation = ComparisonConfig(
         suites=suites, episodes=episodes, members="all", output=_SCORING_OUTPUT
     )
     family = name.partition("/")[0]
-    if family not in shipped_families():
-        return (replace(evaluation, agents=(Path(name),)).command,)
+    if family not in shipped_families(library) or library != SHIPPED:
+        path = Path(name)
+        if family in shipped_families(library):
+            path = library / family / f"{member_name(card.seed)}{TENSOR_SUFFIX}"
+        return (replace(evaluation, contestants=("tanner",), agents=(path,)).command,)
     contestants = (contestant_name(family, card),)
     return (
         replace(evaluation, contestants=contestants).command,

@@ -68,7 +68,8 @@ class RecordFolder:
                 str(path),
                 "records of this very contestant, suite and task",
                 "They were made with another agent, certificate, suite or environment: delete "
-                "this file, choose another output folder, or pass --fresh to discard them all.",
+                f"those of this contestant ({self.root}/*/{entry.file_stem}.jsonl), choose another "
+                "output folder, or pass --fresh to discard all.",
             )
         for record in records:
             if (record.suite, record.contestant, record.member) != _key(entry):
@@ -117,7 +118,7 @@ def _read(path: Path) -> tuple[dict[str, Any], tuple[EpisodeRecord, ...]]:
         header = json.loads(first)
     except OSError as error:
         raise RecordError("records", str(path), "a file that can be read", f"{error}.") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise _foreign(path, first) from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise _foreign(path, first)
@@ -128,14 +129,17 @@ def _read(path: Path) -> tuple[dict[str, Any], tuple[EpisodeRecord, ...]]:
             f"version {FORMAT_VERSION} of {FORMAT!r}",
             f"Another version of the package wrote it. {_REPEAT}",
         )
-    if header["digest"] != _digest(body):
+    try:
+        rows = [json.loads(line) for line in body.splitlines()]
+    except (ValueError, RecursionError):
+        rows = None
+    if rows is None or header["digest"] != _digest(body):
         raise RecordError(
             "records",
             str(path),
             "a file as it was written",
             f"It was cut or edited. {_REPEAT}",
         )
-    rows = [json.loads(line) for line in body.splitlines()]
     return header, tuple(EpisodeRecord.from_row(row) for row in rows)
 
 

@@ -102,7 +102,11 @@ def load_trace(path: Path) -> Trace:
             values = {field.name: file[field.name] for field in fields(Trace)}
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise RecordError(
-            "trace", str(path), "a trace written by a comparison", "Run it again with --fresh."
+            "trace",
+            str(path),
+            "a trace written by a comparison",
+            f"Delete it and its contestant's records in records/{path.parent.name}, and run the "
+            "comparison again: it makes both anew.",
         ) from error
     named = {name: str(value) for name, value in values.items() if not value.ndim}
     arrays = {name: value.astype(np.float64) for name, value in values.items() if value.ndim}

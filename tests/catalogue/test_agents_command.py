@@ -69,11 +69,16 @@ def test_a_card_is_shown_with_the_commands_that_repeat_it(answer, library):
         card.git_revision,
         "97 (89–99)",
         f"{card.command}\n",
-        "python evaluate.py --output results/agents --suites nominal --episodes all "
-        "--contestants ppo\n",
-        "defmanip agents --score results/agents\n",
+        f"python evaluate.py --output results/agents --suites nominal --episodes all --contestants "
+        f"tanner --members all --agents {library}/ppo/seed-0.safetensors\n",
     ):
         assert part in printed
+
+
+def test_a_shipped_agents_commands_measure_its_whole_family_and_write_its_scores(answer):
+    printed = answer("ppo/seed-3")
+    assert "--contestants ppo --members all\n" in printed
+    assert "defmanip agents --score results/agents\n" in printed
 
 
 def test_json_is_the_cards(answer, library):

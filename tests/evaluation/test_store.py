@@ -107,6 +107,16 @@ def test_foreign_rows_are_refused_also_under_a_matching_digest(folder, change):
         folder.read(ENTRY, "f")
 
 
+@pytest.mark.parametrize("row", ["no JSON", "[" * 100_000, "\xff"])
+def test_rows_that_are_no_json_are_refused_also_under_a_matching_digest(folder, row):
+    path = folder.path(ENTRY)
+    body = f"{row}\n".encode("latin-1")
+    header = json.loads(path.read_text().splitlines()[0]) | {"digest": store._digest(body)}
+    path.write_bytes(json.dumps(header).encode() + b"\n" + body)
+    with pytest.raises(RecordError, match="cut or edited"):
+        folder.read(ENTRY, "f")
+
+
 def test_records_of_another_package_version_are_refused(folder, monkeypatch):
     monkeypatch.setattr(store, "__version__", "99.0")
     with pytest.raises(RecordError, match=r"package version.*99\.0.*--fresh"):
@@ -114,7 +124,8 @@ def test_records_of_another_package_version_are_refused(folder, monkeypatch):
 
 
 def test_records_made_with_other_settings_are_refused_with_the_remedy(folder):
-    with pytest.raises(RecordError, match="delete this file, choose another output folder"):
+    remedy = rf"delete those of this contestant .*/\*/{ENTRY.file_stem}.jsonl.*, choose another"
+    with pytest.raises(RecordError, match=remedy):
         folder.read(ENTRY, "another")
 
 

@@ -28,5 +28,5 @@ def test_a_trace_survives_its_file(tmp_path):
 def test_a_damaged_trace_is_refused(tmp_path, content):
     path = tmp_path / "a.paper.npz"
     path.write_bytes(content)
-    with pytest.raises(RecordError, match="--fresh"):
+    with pytest.raises(RecordError, match="records/"):
         load_trace(path)

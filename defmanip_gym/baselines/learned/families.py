@@ -104,7 +104,7 @@ def write_card(family: str, card: AgentCard, library: Path = SHIPPED) -> None:
 
 
 def require_alike(members: Sequence[MlpActor], folder: Path) -> None:
-    """Raise AgentFileError unless members differ by seed only: their scatter is training's."""
+    """Raise AgentFileError unless cards differ by seed and revision only."""
     for name in _ALIKE:
         values = {str(getattr(member.card, name)) for member in members}
         if len(values) > 1:
