@@ -45,9 +45,9 @@ def lagrangian(trial: Trial) -> Overrides:
     path = "defmanip_gym.training.lagrangian.LagrangianPenalty"
     options = {
         "cost_limit": 0.1,
-        "multiplier": trial.suggest_float("multiplier", 0.01, 1.0, log=True),
-        "largest_multiplier": trial.suggest_float("largest_multiplier", 0.3, 10.0, log=True),
-        "learning_rate": trial.suggest_float("multiplier_rate", 1e-3, 1e-1, log=True),
+        "multiplier": 0.0,
+        "largest_multiplier": trial.suggest_float("largest_multiplier", 0.1, 3.0, log=True),
+        "learning_rate": trial.suggest_float("multiplier_rate", 1e-4, 1e-2, log=True),
     }
     return on_policy(trial) | {"callback": [{path: options}]}
 
