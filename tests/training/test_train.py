@@ -239,11 +239,15 @@ def test_bad_runs_are_refused_by_name(config, tmp_path):
 
 
 def test_damaged_checkpoint_is_refused_by_name(config):
-    folder = training.train(config())
+    folder = training.train(config("sac"))
     checkpoint = training.RunFolder(folder).last_checkpoint()
-    (checkpoint / "model.zip").write_bytes(b"nonsense")
-    with pytest.raises(RunFolderError, match="checkpoint"):
-        training.train(TrainConfig(resume=folder, total_timesteps=1024))
+    for path in sorted(checkpoint.iterdir()):
+        whole = path.read_bytes()
+        for damage in (b"", whole[: len(whole) // 2], b"nonsense", b"[]"):
+            path.write_bytes(damage)
+            with pytest.raises(RunFolderError, match="checkpoint"):
+                training.train(TrainConfig(resume=folder, total_timesteps=1024))
+        path.write_bytes(whole)
 
 
 def test_incomplete_configurations_are_refused_and_leave_nothing(config, tmp_path):
