@@ -42,19 +42,23 @@ def train(config: TrainConfig) -> Path:
         ParameterError: hyperparameters that cannot be used.
         RunFolderError: a folder that cannot be written or resumed.
     """
-    config, hyperparameters, folder = _prepare(config)
+    config, hyperparameters = _prepare(config)
     torch.set_num_threads(1)  # physics uses the other cores
     venv = make_training_env(config, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
     total = config.total_timesteps or int(hyperparameters["n_timesteps"])
     interval = max(1, total // config.evaluations)
+    evaluation = make_evaluation_env(config, hyperparameters)
+    callbacks = callbacks_of(hyperparameters)
+    # only now: a folder of what cannot be trained would look like a run
+    folder = _folder(config, hyperparameters)
     validation = ValidationCallback(
-        make_evaluation_env(config, hyperparameters),
+        evaluation,
         episodes=config.evaluation_episodes,
         interval=interval // venv.num_envs,
         on_best=lambda: export(folder, RUN_AGENT, config, model, venv),
     )
-    callbacks = [*callbacks_of(hyperparameters), validation]
+    callbacks.append(validation)
     resumable = [callback for callback in callbacks if isinstance(callback, Resumable)]
     if config.resume is not None:
         read_checkpoint(folder.last_checkpoint(), model, venv, resumable)
@@ -122,14 +126,11 @@ def export(
     to_actor(model, card, observation_statistics(venv)).save(folder.path / name)
 
 
-def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any], RunFolder]:
-    """Return configuration, hyperparameters and folder of a new or resumed run."""
+def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any]]:
+    """Return configuration and hyperparameters of a new or resumed run."""
     if config.resume is None:
-        hyperparameters = load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
-        folder = RunFolder.create(config, hyperparameters, "python " + " ".join(sys.argv))
-        return config, hyperparameters, folder
-    folder = RunFolder(config.resume)
-    stored = folder.read_config()
+        return config, load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
+    stored = RunFolder(config.resume).read_config()
     fields = {
         **stored["train"],
         "resume": config.resume,
@@ -141,10 +142,16 @@ def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any], RunFolde
     try:
         return (
             replace(TrainConfig(), **fields),
-            checked_hyperparameters(stored["hyperparameters"], str(folder.path)),
-            folder,
+            checked_hyperparameters(stored["hyperparameters"], str(config.resume)),
         )
     except (TypeError, KeyError) as error:
         raise RunFolderError(
-            "resume", str(folder.path), "a run of this version", f"config.json: {error}"
+            "resume", str(config.resume), "a run of this version", f"config.json: {error}"
         ) from error
+
+
+def _folder(config: TrainConfig, hyperparameters: dict[str, Any]) -> RunFolder:
+    """Return the folder of a resumed run, or make one."""
+    if config.resume is not None:
+        return RunFolder(config.resume)
+    return RunFolder.create(config, hyperparameters, "python " + " ".join(sys.argv))

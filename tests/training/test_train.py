@@ -174,25 +174,54 @@ def test_randomized_beams_train_under_their_own_name(config, tmp_path):
     assert RANDOMIZED_ENV_ID in folder.name
 
 
+RESIDUAL = "defmanip_gym.baselines.residual_action.ResidualAction"
+PENALTY = "defmanip_gym.training.lagrangian.LagrangianPenalty"
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [
         ({"env_wrapper": "gymnasium.wrappers.ClipAction"}, "vector_wrapper"),
         ({"env_wrapper": "no.such.Wrapper"}, "imported"),
+        ({"env_wrapper": ".relative.Wrapper"}, "imported"),
         ({"env_wrapper": [{"two": {}, "keys": {}}]}, "indentation"),
+        ({"env_wrapper": {RESIDUAL: {"colour": "red"}}}, "env_wrapper.*colour"),
         ({"env_kwargs": {"colour": "red"}}, "colour"),
+        ({"env_kwargs": {"vectorization_mode": "red"}}, "env_kwargs.*red"),
+        ({"callback": "collections.OrderedDict"}, "callback.*OrderedDict"),
+        ({"callback": {PENALTY: {"colour": "red"}}}, "callback.*colour"),
         ({"n_envs": 0}, "n_envs"),
+        ({"n_timesteps": "many"}, "n_timesteps"),
+        ({"normalize": False}, "normalize is False"),
+        ({"gamma": "a"}, "gamma is 'a'"),
+        ({"gamma": 2}, "gamma is 2"),
+        ({"learning_rate": "abc"}, "learning_rate is 'abc'"),
+        ({"learning_rate": "lin_x"}, "learning_rate is 'lin_x'"),
+        ({"learning_rate": -1.0}, "learning_rate is -1"),
+        ({"ent_coef": "1e-3"}, "ent_coef is '1e-3'"),
+        ({"noise_type": "red"}, "noise_type is 'red'"),
+        ({"noise_type": "normal"}, "noise_std is None"),
+        ({"policy_kwargs": {"net_arch": [-1]}}, "net_arch"),
         ({"colour": "red"}, "colour"),
         ({"batch_size": -3}, "batch_size"),
     ],
 )
-def test_hyperparameters_that_cannot_be_used_are_refused_by_name(change, named, config):
+def test_unusable_hyperparameters_are_refused_by_name_and_leave_nothing(change, named, config):
     settings = config()
     content = yaml.safe_load(settings.hyperparameters.read_text())
     content[ENV_ID] |= change
     settings.hyperparameters.write_text(yaml.safe_dump(content))
     with pytest.raises(ParameterError, match=named):
         training.train(settings)
+    assert not settings.output.exists()
+
+
+def test_a_run_folder_keeps_the_hyperparameters_as_they_were_in_the_file(config):
+    settings = config()
+    stored = json.loads((training.train(settings) / "config.json").read_text())
+    assert stored["hyperparameters"] == load_hyperparameters(
+        settings.hyperparameters, "ppo", ENV_ID
+    )
 
 
 def test_residual_learns_in_its_own_certificate_only():
