@@ -52,7 +52,8 @@ def build_model(
     noise = hyperparameters.get("noise_type")
     if noise is not None:
         require_choice("noise_type", noise, ("normal",))
-        require_non_negative("noise_std", deviation := hyperparameters.get("noise_std"))
+        deviation: Any = hyperparameters.get("noise_std")
+        require_non_negative("noise_std", deviation)
         size = venv.action_space.shape[0]  # type: ignore[index]
         normal = NormalActionNoise(np.zeros(size), np.full(size, deviation))
         arguments["action_noise"] = VectorizedActionNoise(normal, venv.num_envs)

@@ -17,6 +17,7 @@ from defmanip_gym.training.config import ALGORITHM_OF, TrainConfig
 from defmanip_gym.training.environments import make_training_env
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model
+from defmanip_gym.training.run_folder import RunFolder
 
 OFF_POLICY = {"n_envs": 4, "learning_starts": 50, "gradient_steps": 1, "buffer_size": 1000}
 SMALL = {
@@ -279,19 +280,58 @@ def test_damaged_checkpoint_is_refused_by_name(config):
         path.write_bytes(whole)
 
 
-def test_incomplete_configurations_are_refused_and_leave_nothing(config, tmp_path):
+def test_incomplete_hyperparameters_are_refused_and_leave_nothing(config, tmp_path):
     path = tmp_path / "short.yml"
     path.write_text(yaml.safe_dump({ENV_ID: {"policy": "MlpPolicy"}}))
     with pytest.raises(ParameterError, match="n_envs"):
         training.train(config(hyperparameters=path))
     assert not (tmp_path / "runs").exists()
-    folder = training.train(config(total_timesteps=128))
-    stored = json.loads((folder / "config.json").read_text())
-    for damage in ({"command": None}, {"train": stored["train"] | {"colour": "red"}}):
-        broken = {key: value for key, value in (stored | damage).items() if value is not None}
-        (folder / "config.json").write_text(json.dumps(broken))
-        with pytest.raises(RunFolderError):
-            training.train(TrainConfig(resume=folder))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A run folder without a run."""
+    settings = TrainConfig(output=tmp_path)
+    return RunFolder.create(settings, load_hyperparameters(None, "ppo", ENV_ID), "train").path
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"command": None},
+        {"hyperparameters": []},
+        {"hyperparameters": {"n_timesteps": "a"}},
+        {"train": {}},
+        {"train": []},
+        {"train": None},
+        {"train": {"colour": "red"}},
+        {"train": {"output": None}},
+        {"train": {"total_timesteps": "a"}},
+        {"train": {"seed": 0.5}},
+        {"train": {"certificate": 3}},
+    ],
+)
+def test_a_damaged_configuration_is_refused_by_name(damage, folder):
+    content = json.loads((folder / "config.json").read_text())
+    for key, value in damage.items():
+        content[key] = content[key] | value if value else value
+    (folder / "config.json").write_text(json.dumps(content))
+    with pytest.raises(RunFolderError, match=r"config\.json"):
+        training.train(TrainConfig(resume=folder))
+
+
+@pytest.mark.parametrize("text", ["", "null", "[]", "{", "\udcff"])
+def test_a_file_that_is_no_configuration_is_refused(text, folder):
+    (folder / "config.json").write_text(text, errors="surrogateescape")
+    with pytest.raises(RunFolderError, match=r"config\.json"):
+        training.train(TrainConfig(resume=folder))
+
+
+def test_a_run_of_another_version_is_not_resumed(folder):
+    content = json.loads((folder / "config.json").read_text()) | {"package_version": "0.0.1"}
+    (folder / "config.json").write_text(json.dumps(content))
+    with pytest.raises(RunFolderError, match=r"0\.0\.1"):
+        training.train(TrainConfig(resume=folder))
 
 
 def test_missing_damaged_and_foreign_agents_are_refused(config, tmp_path):
