@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import pickle
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,17 @@ _MODEL, _NORMALIZATION, _STATE, _REPLAY = (
     "replay.npz",
 )
 _REPLAY_FIELDS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+# what a cut, edited or foreign file makes NumPy, torch and zipfile raise
+_DAMAGE = (
+    OSError,
+    EOFError,
+    ValueError,
+    TypeError,
+    KeyError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    pickle.UnpicklingError,
+)
 
 
 def observation_statistics(venv: VecNormalize) -> RunningMeanStd:
@@ -94,7 +107,7 @@ def read_checkpoint(
             # new episodes follow: returns over several steps must not reach into them
             last = buffer.pos - 1
             buffer.timeouts[last] = np.logical_or(buffer.timeouts[last], buffer.dones[last] == 0)
-    except (OSError, ValueError, KeyError, RuntimeError, json.JSONDecodeError) as error:
+    except _DAMAGE as error:
         raise RunFolderError(
             "checkpoint", str(folder), "one written by this run", f"Cannot read it: {error}"
         ) from error

@@ -9,9 +9,10 @@ from typing import Literal, get_args
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
-from defmanip_gym.validation import require_choice, require_non_negative, require_whole
+from defmanip_gym.validation import require_choice, require_whole
 
 Recipe = Literal["ppo", "sac", "tqc", "residual", "lagrangian"]
+Method = Literal["l1", "phase_plane", "tanner"]
 
 # what learns in each recipe
 ALGORITHM_OF = {"ppo": "ppo", "sac": "sac", "tqc": "tqc", "residual": "ppo", "lagrangian": "ppo"}
@@ -46,7 +47,7 @@ class TrainConfig:
     seed: int = 0
     """Seed of networks, exploration and starts, below 1,000,000."""
 
-    certificate: Literal["l1", "phase_plane", "tanner"] | None = None
+    certificate: Method | None = None
     """Train inside NuMaxActionScaling with this certificate for the true beam; residual has its
     own."""
 
@@ -78,9 +79,11 @@ class TrainConfig:
                 "none with --algo residual",
                 "Its hyperparameter file names the certificate.",
             )
+        if self.certificate is not None:
+            require_choice("certificate", self.certificate, get_args(Method))
         if self.total_timesteps is not None:
             require_whole("total_timesteps", self.total_timesteps, 1)
-        require_non_negative("seed", self.seed)
+        require_whole("seed", self.seed, 0)
         require_whole("evaluations", self.evaluations, 1)
         require_whole("evaluation_episodes", self.evaluation_episodes, 1)
         require_whole("num_threads", self.num_threads, 0)

@@ -7,11 +7,11 @@ from typing import Any
 import gymnasium
 from stable_baselines3.common.vec_env import VecNormalize
 
-from defmanip_gym.errors import ParameterError
+from defmanip_gym.errors import DefmanipError, ParameterError
 from defmanip_gym.evaluation.seeds import LARGEST_BATCH, VALIDATION_SEED, training_seed
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.training.config import TrainConfig
-from defmanip_gym.training.hyperparameters import components
+from defmanip_gym.training.hyperparameters import built, components
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.validation import require_between, require_whole
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling, transport_config
@@ -52,12 +52,14 @@ def _sb3_env(config: TrainConfig, hyperparameters: dict[str, Any], num_envs: int
             num_threads=config.num_threads,
             **arguments,
         )
-    except TypeError as error:
+    except DefmanipError:
+        raise
+    except (TypeError, ValueError, gymnasium.error.Error) as error:
         raise ParameterError(
             "env_kwargs", arguments, f"arguments of {env_id}", f"{error}."
         ) from error
     for wrapper, options in components(hyperparameters, "env_wrapper"):
-        env = _batched(wrapper)(env, **options)
+        env = built("env_wrapper", _batched(wrapper), (env,), options)
     if config.certificate is not None:
         transport = transport_config(env)
         certificate = certify(

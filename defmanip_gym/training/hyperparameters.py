@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from defmanip_gym.errors import ParameterError
+from defmanip_gym.errors import DefmanipError, ParameterError
 
 HYPERPARAMETERS = Path(__file__).parents[1] / "baselines" / "learned" / "hyperparams"
 
@@ -48,12 +49,14 @@ def load_hyperparameters(path: Path | None, algo: str, env_id: str) -> dict[str,
     return checked_hyperparameters(content[env_id], str(path))
 
 
-def checked_hyperparameters(hyperparameters: dict[str, Any], source: str) -> dict[str, Any]:
-    """Return hyperparameters that have what training needs.
+def checked_hyperparameters(hyperparameters: Any, source: str) -> dict[str, Any]:
+    """Return hyperparameters that have what training needs besides the algorithm's own.
 
     Raises:
-        ParameterError: an entry is missing.
+        ParameterError: an entry is missing, or is one that training would not follow.
     """
+    if not isinstance(hyperparameters, dict):
+        raise ParameterError("hyperparameters", hyperparameters, "a mapping", f"Check {source}.")
     missing = {"n_envs", "n_timesteps", "policy", "learning_rate"} - set(hyperparameters)
     if missing:
         raise ParameterError(
@@ -62,6 +65,16 @@ def checked_hyperparameters(hyperparameters: dict[str, Any], source: str) -> dic
             "n_envs, n_timesteps, policy, learning_rate and the algorithm's own",
             f"It lacks {', '.join(sorted(missing))}.",
         )
+    steps, normalize = hyperparameters["n_timesteps"], hyperparameters.get("normalize")
+    if isinstance(steps, bool) or not isinstance(steps, int | float) or not 1 <= steps < math.inf:
+        raise ParameterError("n_timesteps", steps, "a number >= 1", f"Check {source}.")
+    if normalize is not True:
+        raise ParameterError(
+            "normalize", normalize, "true", "Training always normalizes: write it so."
+        )
+    gamma = hyperparameters.get("gamma", 1.0)
+    if isinstance(gamma, bool) or not isinstance(gamma, int | float) or not 0 < gamma <= 1:
+        raise ParameterError("gamma", gamma, "a number, 0 < gamma <= 1", f"Check {source}.")
     return dict(hyperparameters)
 
 
@@ -79,10 +92,25 @@ def components(hyperparameters: dict[str, Any], key: str) -> Iterator[tuple[Any,
         module, _, name = path.rpartition(".")
         try:
             yield getattr(importlib.import_module(module), name), arguments
-        except (ImportError, AttributeError, ValueError) as error:
+        except (ImportError, AttributeError, TypeError, ValueError) as error:
             raise ParameterError(
                 key, path, "the dotted path of a class", f"It cannot be imported: {error}."
             ) from error
+
+
+def built(key: str, kind: Callable[..., Any], base: tuple[Any, ...], arguments: Any) -> Any:
+    """Return ``kind(*base, **arguments)``, the arguments being those of the entry ``key``.
+
+    Raises:
+        ParameterError: arguments that ``kind`` does not take.
+    """
+    try:
+        return kind(*base, **arguments)
+    except DefmanipError:
+        raise
+    except (TypeError, ValueError) as error:
+        name = getattr(kind, "__name__", str(kind))
+        raise ParameterError(key, arguments, f"arguments of {name}", f"{error}.") from error
 
 
 def _only_item(entry: Any, key: str) -> tuple[str, dict[str, Any]]:

@@ -15,6 +15,7 @@ from typing import Any
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.files import write_atomically
 from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.stored_run import StoredRun
 from defmanip_gym.version import __version__
 
 LAST_AGENT = "last"  # beside RUN_AGENT, the best on the validation starts
@@ -68,19 +69,18 @@ class RunFolder:
         }
         write_atomically(self.path / _CONFIG, (json.dumps(content, indent=2) + "\n").encode())
 
-    def read_config(self) -> dict[str, Any]:
+    def read_config(self) -> StoredRun:
         """Return what ``create`` wrote.
 
         Raises:
-            RunFolderError: this is no run folder of this package.
+            RunFolderError: this is no run folder of this package, or its configuration is damaged.
         """
+        path = self.path / _CONFIG
         try:
-            content = json.loads((self.path / _CONFIG).read_text())
-            keys = ("train", "hyperparameters", "command", "package_version", "git_revision")
-            return {key: content[key] for key in keys}
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+            return StoredRun.checked(json.loads(path.read_text()), str(path))
+        except (OSError, ValueError) as error:  # ParameterError and JSON's are ValueErrors
             raise RunFolderError(
-                "resume", str(self.path), "a folder made by train.py", f"{_CONFIG}: {error}"
+                "run", str(self.path), "a folder made by train.py", f"{_CONFIG}: {error}"
             ) from error
 
     def save_checkpoint(self, timesteps: int, write: Callable[[Path], None]) -> Path:

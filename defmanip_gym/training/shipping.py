@@ -77,7 +77,7 @@ def _finished(path: Path) -> _Finished:
     """Return a run with its agent; raise RunFolderError unless it may be shipped."""
     stored = RunFolder(path).read_config()
     agent, last = (load_actor(path / name) for name in (RUN_AGENT, LAST_AGENT))
-    planned = stored["train"]["total_timesteps"] or stored["hyperparameters"]["n_timesteps"]
+    planned = stored.train.total_timesteps or stored.hyperparameters["n_timesteps"]
     if last.card.total_timesteps < planned:
         raise RunFolderError(
             f"steps of {path}",
@@ -93,7 +93,7 @@ def _finished(path: Path) -> _Finished:
             "a commit without changes",
             "Nobody could repeat this run: commit, and train again.",
         )
-    parts = [agent.card.recipe, stored["train"]["certificate"]]
+    parts = [agent.card.recipe, stored.train.certificate]
     if agent.card.env_id == RANDOMIZED_ENV_ID:
         parts.append("randomized")
     return _Finished(path=path, agent=agent, family="-".join(filter(None, parts)))

@@ -27,10 +27,11 @@ from defmanip_gym.training.checkpoint import (
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.environments import make_evaluation_env, make_training_env
 from defmanip_gym.training.export import actor_modules, hidden_activation, residual_of, to_actor
-from defmanip_gym.training.hyperparameters import checked_hyperparameters, load_hyperparameters
+from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model, callbacks_of
 from defmanip_gym.training.run_folder import LAST_AGENT, RunFolder
 from defmanip_gym.training.validation_callback import ValidationCallback
+from defmanip_gym.version import __version__
 
 
 def train(config: TrainConfig) -> Path:
@@ -42,19 +43,23 @@ def train(config: TrainConfig) -> Path:
         ParameterError: hyperparameters that cannot be used.
         RunFolderError: a folder that cannot be written or resumed.
     """
-    config, hyperparameters, folder = _prepare(config)
+    config, hyperparameters = _prepare(config)
     torch.set_num_threads(1)  # physics uses the other cores
     venv = make_training_env(config, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
     total = config.total_timesteps or int(hyperparameters["n_timesteps"])
     interval = max(1, total // config.evaluations)
+    evaluation = make_evaluation_env(config, hyperparameters)
+    callbacks = callbacks_of(hyperparameters)
+    # only now: a folder of what cannot be trained would look like a run
+    folder = _folder(config, hyperparameters)
     validation = ValidationCallback(
-        make_evaluation_env(config, hyperparameters),
+        evaluation,
         episodes=config.evaluation_episodes,
         interval=interval // venv.num_envs,
         on_best=lambda: export(folder, RUN_AGENT, config, model, venv),
     )
-    callbacks = [*callbacks_of(hyperparameters), validation]
+    callbacks.append(validation)
     resumable = [callback for callback in callbacks if isinstance(callback, Resumable)]
     if config.resume is not None:
         read_checkpoint(folder.last_checkpoint(), model, venv, resumable)
@@ -98,7 +103,7 @@ def export(
 ) -> None:
     """Write the model's policy as a portable agent into the run folder."""
     started = folder.read_config()  # as it was when the run began, not now
-    hyperparameters = started["hyperparameters"]
+    hyperparameters = started.hyperparameters
     residual = residual_of(hyperparameters)
     card = AgentCard(
         env_id=config.env_id,
@@ -112,39 +117,37 @@ def export(
         normalization=Normalization(clip=venv.clip_obs, variance_floor=venv.epsilon),
         residual_authority_m_s2=residual.authority_m_s2 if residual else None,
         residual_decision_periods=residual.decision_periods if residual else 1,
-        command=started["command"],
+        command=started.command,
         seed=config.seed,
         total_timesteps=model.num_timesteps,
-        package_version=started["package_version"],
-        git_revision=started["git_revision"],
+        package_version=started.package_version,
+        git_revision=started.git_revision,
         certificate=residual.certificate if residual else config.certificate,
     )
     to_actor(model, card, observation_statistics(venv)).save(folder.path / name)
 
 
-def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any], RunFolder]:
-    """Return configuration, hyperparameters and folder of a new or resumed run."""
+def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any]]:
+    """Return configuration and hyperparameters of a new or resumed run."""
     if config.resume is None:
-        hyperparameters = load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
-        folder = RunFolder.create(config, hyperparameters, "python " + " ".join(sys.argv))
-        return config, hyperparameters, folder
-    folder = RunFolder(config.resume)
-    stored = folder.read_config()
-    fields = {
-        **stored["train"],
-        "resume": config.resume,
-        "output": Path(stored["train"]["output"]),
-        "hyperparameters": None,
-    }
-    if config.total_timesteps is not None:
-        fields["total_timesteps"] = config.total_timesteps
-    try:
-        return (
-            replace(TrainConfig(), **fields),
-            checked_hyperparameters(stored["hyperparameters"], str(folder.path)),
-            folder,
-        )
-    except (TypeError, KeyError) as error:
+        return config, load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
+    stored = RunFolder(config.resume).read_config()
+    if stored.package_version != __version__:
         raise RunFolderError(
-            "resume", str(folder.path), "a run of this version", f"config.json: {error}"
-        ) from error
+            f"version of {config.resume}",
+            stored.package_version,
+            f"{__version__}, as installed",
+            "Environment or reward may differ: install the run's version, or train anew.",
+        )
+    total = config.total_timesteps or stored.train.total_timesteps
+    return (
+        replace(stored.train, resume=config.resume, total_timesteps=total),
+        stored.hyperparameters,
+    )
+
+
+def _folder(config: TrainConfig, hyperparameters: dict[str, Any]) -> RunFolder:
+    """Return the folder of a resumed run, or make one."""
+    if config.resume is not None:
+        return RunFolder(config.resume)
+    return RunFolder.create(config, hyperparameters, "python " + " ".join(sys.argv))

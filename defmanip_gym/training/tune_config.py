@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import get_args
 
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.training.config import Recipe, TrainConfig
-from defmanip_gym.validation import require_choice, require_non_negative, require_whole
+from defmanip_gym.validation import require_choice, require_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,11 +52,10 @@ class TuneConfig:
     """Threads for physics, 0 for one per CPU."""
 
     def __post_init__(self) -> None:
-        require_choice("algo", self.algo, get_args(Recipe))
         require_choice("env", self.env, ENV_IDS)
-        require_non_negative("seed", self.seed)
-        for name in ("trials", "timesteps", "evaluations", "evaluation_episodes"):
-            require_whole(name, getattr(self, name), 1)
+        require_whole("trials", self.trials, 1)
+        require_whole("timesteps", self.timesteps, 1)
+        _ = self.training  # checks the rest
 
     @property
     def training(self) -> TrainConfig:

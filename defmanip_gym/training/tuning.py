@@ -8,8 +8,7 @@ from typing import Any
 import optuna
 import torch
 from filelock import FileLock, Timeout
-from optuna.storages import JournalStorage
-from optuna.storages.journal import JournalFileBackend
+from optuna.trial import TrialState
 from rich.console import Console
 from stable_baselines3.common.callbacks import BaseCallback
 
@@ -19,10 +18,17 @@ from defmanip_gym.training.environments import make_evaluation_env, make_trainin
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model, callbacks_of
 from defmanip_gym.training.search_spaces import SEARCH_SPACES
+from defmanip_gym.training.study import (
+    begin_with_the_file,
+    finished_trials,
+    is_as_in_the_file,
+    open_study,
+)
 from defmanip_gym.training.tune_config import TuneConfig
 from defmanip_gym.training.validation_callback import ValidationCallback
 
-STUDY_FILE, TABLE_FILE = "study.log", "trials.md"
+TABLE_FILE = "trials.md"
+_NOTHING = "as in the file"  # of a trial that varies nothing
 
 
 def run_tune(config: TuneConfig) -> Path:
@@ -32,7 +38,8 @@ def run_tune(config: TuneConfig) -> Path:
 
     Raises:
         ParameterError: hyperparameters that cannot be used.
-        RunFolderError: the output folder cannot be used, or another study writes to it.
+        RunFolderError: the output folder cannot be used, another study writes to it, or its study
+            is damaged or was begun with other settings.
     """
     console = Console()
     torch.set_num_threads(1)
@@ -40,7 +47,7 @@ def run_tune(config: TuneConfig) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / ".lock", timeout=0):
-            study = _study(config, folder)
+            study = open_study(config, folder)
             table = folder / TABLE_FILE
             _run_missing(config, study, console)
             write_atomically(table, study_table(study, config).encode())
@@ -53,7 +60,9 @@ def run_tune(config: TuneConfig) -> Path:
     except KeyboardInterrupt:
         console.print(f"Stopped; {folder} keeps finished trials. Go on with the same command.")
         raise SystemExit(130) from None
-    console.print(f"Best: {study.best_params} ({study.best_value:.3f})\nTable: {table}")
+    if study.get_trials(states=(TrialState.COMPLETE,)):  # else all were given up
+        console.print(f"Best: {study.best_params or _NOTHING} ({study.best_value:.3f})")
+    console.print(f"Table: {table}")
     return table
 
 
@@ -71,22 +80,11 @@ class _Watch(BaseCallback):
         return not self.pruned
 
 
-def _study(config: TuneConfig, folder: Path) -> optuna.Study:
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    return optuna.create_study(
-        study_name=config.algo,
-        storage=JournalStorage(JournalFileBackend(str(folder / STUDY_FILE))),
-        sampler=optuna.samplers.TPESampler(seed=config.seed, n_startup_trials=5),
-        pruner=optuna.pruners.MedianPruner(
-            n_startup_trials=4, n_warmup_steps=config.timesteps // 3
-        ),
-        direction="maximize",
-        load_if_exists=True,
-    )
-
-
 def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> None:
-    finished = [trial for trial in study.trials if trial.state.is_finished()]
+    missing = config.trials - len(finished_trials(study))
+    if missing <= 0:
+        return
+    begin_with_the_file(study)
 
     def tell(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:
         value = "given up" if trial.value is None else f"{trial.value:.3f}"
@@ -94,7 +92,7 @@ def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> N
 
     study.optimize(
         lambda trial: _objective(config, trial),
-        n_trials=max(0, config.trials - len(finished)),
+        n_trials=missing,
         callbacks=[tell],
     )
 
@@ -102,7 +100,7 @@ def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> N
 def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
     training = config.training
     hyperparameters = load_hyperparameters(None, config.algo, config.env)
-    if trial.number > 0:  # the first shows what the file's own values are worth
+    if not is_as_in_the_file(trial):
         hyperparameters |= SEARCH_SPACES[config.algo](trial)
     venv = make_training_env(training, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
@@ -124,9 +122,9 @@ def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
 
 
 def study_table(study: optuna.Study, config: TuneConfig) -> str:
-    """Return all trials as a Markdown table, the best first."""
+    """Return all finished trials as a Markdown table, the best first."""
     trials = sorted(
-        (trial for trial in study.trials if trial.state.is_finished()),
+        finished_trials(study),
         key=lambda trial: (trial.value is None, -(trial.value or 0.0)),
     )
     names = sorted({name for trial in trials for name in trial.params})
@@ -145,5 +143,5 @@ def _row(cells: list[str]) -> str:
 
 def _cell(value: Any) -> str:
     if value is None:
-        return "as in the file"
+        return _NOTHING
     return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import get_args
 
@@ -19,6 +20,7 @@ from defmanip_gym.cli import main
 from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
 from defmanip_gym.errors import AgentFileError, RunFolderError
 from defmanip_gym.training.config import Recipe, TrainConfig
+from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.ship_config import ShipConfig
 from defmanip_gym.training.shipping import ship
 
@@ -34,13 +36,13 @@ def run(tmp_path):
         small_agent(seed=seed, total_timesteps=40, **changes).save(path / "agent")
         small_agent(seed=seed, total_timesteps=steps, **changes).save(path / "last")
         content = {
-            "train": {"total_timesteps": None, "certificate": certificate},
-            "hyperparameters": {"n_timesteps": 100},
+            "train": asdict(TrainConfig(certificate=certificate)),
+            "hyperparameters": load_hyperparameters(None, "ppo", ENV_ID) | {"n_timesteps": 100},
             "command": "python train.py",
             "package_version": "0.1.0",
             "git_revision": "0123456789ab",
         }
-        (path / "config.json").write_text(json.dumps(content))
+        (path / "config.json").write_text(json.dumps(content, default=str))
         return path
 
     return make
@@ -109,6 +111,13 @@ def test_a_run_without_agent_and_no_run_at_all_are_refused(run, library, tmp_pat
         ship(ShipConfig(runs=(tmp_path,), library=library))
     with pytest.raises(RunFolderError, match="at least one"):
         ShipConfig(runs=(), library=library)
+
+
+def test_a_run_with_a_damaged_configuration_is_refused(run, library):
+    path = run(0) / "config.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"train": {}}))
+    with pytest.raises(RunFolderError, match="train"):
+        ship(ShipConfig(runs=(path.parent,), library=library))
 
 
 def test_the_command_says_what_it_shipped(run, library, monkeypatch, capsys):

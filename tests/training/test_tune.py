@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from defmanip_gym.errors import ParameterError, RunFolderError
+from defmanip_gym.training import study as studies
 from defmanip_gym.training import tuning
 from defmanip_gym.training.config import ALGORITHM_OF
 from defmanip_gym.training.environments import make_training_env
@@ -47,6 +48,86 @@ def test_ctrl_c_keeps_finished_trials_and_says_how_to_go_on(monkeypatch, tmp_pat
     assert "1.000" in table and "2.000" in table
 
 
+def test_an_interrupted_first_trial_is_made_again_as_in_the_file(monkeypatch, tmp_path):
+    built = []
+
+    def build_model(algo, seed, hyperparameters, venv):
+        built.append(hyperparameters)
+        raise KeyboardInterrupt if len(built) == 1 else optuna.TrialPruned()
+
+    monkeypatch.setattr(tuning, "build_model", build_model)
+    with pytest.raises(SystemExit):
+        tuning.run_tune(config(tmp_path, trials=2))
+    table = tuning.run_tune(config(tmp_path, trials=2)).read_text()
+    assert table.count("given up") == 2
+    file = load_hyperparameters(None, "ppo", config(tmp_path).env)
+    assert built[:2] == [file, file] and len(built) == 3 and built[2] != file
+
+
+def test_a_trial_that_failed_is_made_again(monkeypatch, tmp_path):
+    def fail(config, trial):
+        raise RuntimeError("out of memory")
+
+    monkeypatch.setattr(tuning, "_objective", fail)
+    with pytest.raises(RuntimeError):
+        tuning.run_tune(config(tmp_path, trials=1))
+    monkeypatch.setattr(tuning, "_objective", lambda config, trial: 2.0)
+    table = tuning.run_tune(config(tmp_path, trials=1)).read_text()
+    assert "2.000" in table and "given up" not in table
+
+
+def test_a_study_that_goes_on_draws_other_values(monkeypatch, tmp_path):
+    drawn = []
+
+    def objective(config, trial):
+        drawn.append(trial.suggest_float("x", 0.0, 1.0))
+        return 0.0
+
+    monkeypatch.setattr(tuning, "_objective", objective)
+    for trials in (1, 2, 3):
+        tuning.run_tune(config(tmp_path, trials=trials))
+    assert len(set(drawn)) == 3
+
+
+@pytest.mark.parametrize(
+    "other", [{"timesteps": 1}, {"seed": 1}, {"evaluations": 1}, {"evaluation_episodes": 1}]
+)
+def test_a_study_of_other_settings_is_refused_by_name(other, quick, tmp_path):
+    tuning.run_tune(config(tmp_path))
+    with pytest.raises(RunFolderError, match=next(iter(other))):
+        tuning.run_tune(config(tmp_path, **other))
+    tuning.run_tune(config(tmp_path, num_threads=1))  # scores do not depend on it
+
+
+def test_a_study_of_other_hyperparameters_is_refused_by_name(quick, tmp_path, monkeypatch):
+    tuning.run_tune(config(tmp_path))
+    changed = load_hyperparameters(None, "ppo", config(tmp_path).env) | {"gamma": 0.5}
+    monkeypatch.setattr(studies, "load_hyperparameters", lambda *_: changed)
+    with pytest.raises(RunFolderError, match="gamma was 0.955 and is 0.5.$"):
+        tuning.run_tune(config(tmp_path))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda whole: whole[: len(whole) // 2],
+        lambda whole: whole[:-1],
+        lambda whole: whole[whole.index(b"\n") + 1 :],
+        lambda whole: b"\xff\xfe\n" + whole,
+        lambda whole: whole + b"[]\n",
+        lambda whole: whole + b'{"op_code": 99}\n',
+        lambda whole: whole + b"{}\n",
+    ],
+    ids=["halved", "cut", "headless", "binary", "list", "foreign", "empty entry"],
+)
+def test_a_damaged_study_is_refused_and_left_as_it_is(damage, quick, tmp_path):
+    path = tuning.run_tune(config(tmp_path)).parent / studies.STUDY_FILE
+    path.write_bytes(damaged := damage(path.read_bytes()))
+    with pytest.raises(RunFolderError, match="--output"):
+        tuning.run_tune(config(tmp_path))
+    assert path.read_bytes() == damaged
+
+
 def test_a_short_trial_trains_and_is_scored(tmp_path):
     table = tuning.run_tune(
         config(tmp_path, trials=1, timesteps=4096, evaluations=1, evaluation_episodes=2)
@@ -68,6 +149,10 @@ def test_every_recipe_has_a_search_space_that_its_algorithm_takes(algo, tmp_path
 def test_bad_settings_are_refused_by_name(quick, tmp_path):
     with pytest.raises(ParameterError, match="trials"):
         config(tmp_path, trials=0)
+    with pytest.raises(ParameterError, match="seed"):
+        config(tmp_path, seed=2_000_000)
+    with pytest.raises(ParameterError, match="evaluations"):
+        config(tmp_path, evaluations=0)
     (tmp_path / "file").write_text("")
     with pytest.raises(RunFolderError, match="output"):
         tuning.run_tune(config(tmp_path, output=tmp_path / "file"))
