@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 
 from defmanip_gym.catalogue.config import AgentsConfig
 from defmanip_gym.certification.config import CertifyConfig
@@ -94,5 +95,7 @@ def _guarded(command: Callable[[], None]) -> None:
     try:
         command()
     except DefmanipError as error:
-        Console(stderr=True).print(f"[bold red]{type(error).__name__}[/]: {error}", highlight=False)
+        Console(stderr=True).print(
+            f"[bold red]{type(error).__name__}[/]: {escape(str(error))}", highlight=False
+        )
         sys.exit(2)

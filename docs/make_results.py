@@ -47,8 +47,8 @@ intervals mean: [evaluation.md](evaluation.md). What each agent is: `defmanip ag
 How to read it: a contestant's part after the slash is the certificate that is enforced on it;
 without a slash there is none. Scores are mean speeds towards the goal as a share of the speed
 limit, 0 for an episode without success. A sentence names a winner only where intervals separate it
-from everybody else in its class. Small print in the tables: 95 % intervals. How long a decision takes
-depends on the machine, and is in the report that `evaluate.py` writes.
+from everybody else in its class. Small print in the tables: 95 % intervals. How long a decision
+takes depends on the machine, and is in the report that `evaluate.py` writes.
 
 {certificates}
 """

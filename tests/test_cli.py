@@ -39,6 +39,7 @@ def test_defmanip_lists_its_commands():
         (("evaluate.py", "--suites", "nomnial"), "mismatch"),
         (("evaluate.py", "--agents", "nothing.safetensors"), "nothing.json"),
         (("evaluate.py", "--episodes", "0"), "episodes"),
+        (("evaluate.py", "--agents", "[odd].safetensors"), "[odd].json"),
     ],
 )
 def test_wrong_input_gets_a_message_and_no_traceback(words, said, tmp_path):
