@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -150,4 +151,4 @@ def _folder(config: TrainConfig, hyperparameters: dict[str, Any]) -> RunFolder:
     """Return the folder of a resumed run, or make one."""
     if config.resume is not None:
         return RunFolder(config.resume)
-    return RunFolder.create(config, hyperparameters, "python " + " ".join(sys.argv))
+    return RunFolder.create(config, hyperparameters, shlex.join(["python", *sys.argv]))
