@@ -50,7 +50,7 @@ class TrainingConfig:
     """Algorithms, each in our setup and with SB3's defaults."""
     steps: int = 16_384
     """Env steps of PPO in a turn, rounded up to whole rollouts."""
-    off_policy_steps: int = 320
+    off_policy_steps: int = 1280
     """Env steps of SAC in a turn."""
     rounds: int = 3
     """How often every candidate takes its turn."""

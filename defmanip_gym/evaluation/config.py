@@ -37,7 +37,7 @@ class ComparisonConfig:
     """How many scenarios of each condition of a suite are run, the first ones; or "all"."""
     contestants: tuple[str, ...] | None = None
     """Names of those who take part; all by default."""
-    members: int | Literal["all"] = 2
+    members: int | Literal["all"] = 3
     """How many agents of each learned contestant take part, lowest training seeds first; or
     "all"."""
     agents: tuple[Path, ...] = ()

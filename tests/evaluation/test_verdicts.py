@@ -46,6 +46,12 @@ def test_a_contestant_does_not_differ_from_itself():
     assert not gap.first_is_better and not gap.second_is_better
 
 
+def test_differences_of_shares_stay_among_the_possible_ones():
+    apart = np.concatenate([np.full((1, SCENARIOS), 0.9), np.full((1, SCENARIOS), 0.1)])
+    ppo, tanner = contestants(ppo=apart, tanner=scores(0.4))
+    assert difference(ppo, tanner).iqm.interval == (-1.0, 1.0)
+
+
 def test_a_higher_iqm_bought_with_failures_is_not_better():
     often_failing = scores(0.55, seed=1)
     often_failing[0, :4] = 0.0

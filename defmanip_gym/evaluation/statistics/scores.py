@@ -11,6 +11,7 @@ from defmanip_gym.evaluation.statistics.episode_table import EpisodeTable
 from defmanip_gym.evaluation.statistics.intervals import (
     CONFIDENCE,
     Estimate,
+    Interval,
     VarianceComponent,
     welch_interval,
 )
@@ -59,9 +60,7 @@ class Scores:
         components = _components(self.table, self.draws[:, index], self._due_to_members(index))
         value = float(self.point[index])
         interval = welch_interval(value, components, confidence)
-        if interval is not None:  # scores are shares of a limit
-            interval = max(interval[0], 0.0), min(interval[1], max(value, 1.0))
-        return Estimate(value=value, interval=interval)
+        return Estimate(value=value, interval=_within(interval, value, 0.0))
 
     def difference(self, other: Scores, aggregate: str, confidence: float = CONFIDENCE) -> Estimate:
         """Return by how much an aggregate exceeds another contestant's on the same scenarios.
@@ -76,13 +75,20 @@ class Scores:
         draws = self.draws[:, index] - other.draws[:, index]
         value = float(self.point[index] - other.point[index])
         interval = welch_interval(value, _components(self.table, draws, members), confidence)
-        return Estimate(value=value, interval=interval)
+        return Estimate(value=value, interval=_within(interval, value, -1.0))
 
     def _due_to_members(self, index: int) -> list[VarianceComponent]:
         count = len(self.table.members)
         if count < 2:
             return []
         return [VarianceComponent(float(self.member_variance[index]), count - 1)]
+
+
+def _within(interval: Interval | None, value: float, lowest: float) -> Interval | None:
+    """Cut an interval to what scores, which are shares of a limit, or differences can be."""
+    if interval is None:
+        return None
+    return max(interval[0], min(value, lowest)), min(interval[1], max(value, 1.0))
 
 
 def score(bootstrap: CrossedBootstrap, table: EpisodeTable) -> Scores:
