@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from defmanip_gym.baselines.learned.agents import load_agent
+from defmanip_gym.baselines.learned.agents import load_agent, shipped_families
 from defmanip_gym.baselines.learned.card import SuiteScore
 from defmanip_gym.baselines.learned.families import SHIPPED, write_card
 from defmanip_gym.cli import main
@@ -96,7 +96,7 @@ def test_an_agent_of_ones_own_is_shown_by_its_path(answer, library):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["nobody"], "shipped agent: ppo"),
+        (["nobody"], f"shipped agent: {', '.join(shipped_families())}"),
         (["ppo/seed-99"], "seed-0"),
         (["--score", "nowhere"], "evaluate.py"),
         (["ppo", "--score", "nowhere"], "without a name"),
