@@ -20,7 +20,9 @@ START = (-3.0, 1.0, 0.0, np.pi / 3, -np.pi / 2, 0.0)
 
 
 def make(count=3, **arguments):
-    return Sb3VecEnv(gymnasium.make_vec(ENV_ID, num_envs=count, **arguments))
+    venv = Sb3VecEnv(gymnasium.make_vec(ENV_ID, num_envs=count, **arguments))
+    venv.seed(0)
+    return venv
 
 
 def steps(venv, count, action=0.1):
@@ -89,8 +91,6 @@ def test_seeds_reach_the_episodes_and_are_used_once():
 
 def test_options_reach_the_next_reset_only():
     venv, expected = make(), make()
-    for env in (venv, expected):
-        env.seed(0)
     venv.set_options({"start": START})
     given = venv.reset()  # draws nothing
     assert np.array_equal(given[0], given[2])
