@@ -28,7 +28,7 @@ from defmanip_gym.training.tune_config import TuneConfig
 from defmanip_gym.training.validation_callback import ValidationCallback
 
 TABLE_FILE = "trials.md"
-_NOTHING = "as in the file"  # of a trial that varies nothing
+_AS_IN_THE_FILE = "as in the file"  # shown of a trial that varies nothing
 
 
 def run_tune(config: TuneConfig) -> Path:
@@ -61,7 +61,7 @@ def run_tune(config: TuneConfig) -> Path:
         console.print(f"Stopped; {folder} keeps finished trials. Go on with the same command.")
         raise SystemExit(130) from None
     if study.get_trials(states=(TrialState.COMPLETE,)):  # else all were given up
-        console.print(f"Best: {study.best_params or _NOTHING} ({study.best_value:.3f})")
+        console.print(f"Best: {study.best_params or _AS_IN_THE_FILE} ({study.best_value:.3f})")
     console.print(f"Table: {table}")
     return table
 
@@ -143,5 +143,5 @@ def _row(cells: list[str]) -> str:
 
 def _cell(value: Any) -> str:
     if value is None:
-        return _NOTHING
+        return _AS_IN_THE_FILE
     return f"{value:.3g}" if isinstance(value, float) else str(value)
