@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.compiled import machine_code
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.disturbance import disturbing_force
 from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score_starts, score_steps
 from defmanip_gym.envs.sensor_noise import SensorNoise
@@ -208,7 +209,7 @@ class TransportEngine:
         before = self._scores
         self._inner_loop.write_forces(actions, self._plant, self.simulation.generalized_forces)
         if self.config.disturbance.has_force:
-            self.simulation.push_grasp(self._disturbing_force())
+            self.simulation.push_grasp(disturbing_force(self.config, self._steps))
         failed = self.simulation.step(self.config.task.substeps)
         self._steps += 1
         self._plant, self._plant_before = self._plant_before, self._plant
@@ -269,14 +270,6 @@ class TransportEngine:
             swing,
         )
         self.simulation.report(ids, force_b)
-
-    def _disturbing_force(self) -> Array:
-        disturbance = self.config.disturbance
-        time_s = self._steps * self.config.task.control_period_s
-        force = disturbance.force_bias_n + disturbance.force_amplitude_n * np.sin(
-            disturbance.force_frequency_rad_s * time_s
-        )
-        return np.repeat(force[:, None], 3, axis=1)
 
 
 _INFO_KEYS = (*FLAGS, *MEASURES, "beam_damping", "beam_mass_kg", "beam_length_m")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
-from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams, DisturbanceParams
+from defmanip_gym.params import BeamParams, DisturbanceParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_instance, require_non_negative, require_positive
 
@@ -55,25 +55,6 @@ class Condition:
     def delay_periods(self) -> int:
         """The delay in control periods."""
         return round(self.actuation_delay_s / TaskParams().control_period_s)
-
-    @property
-    def within_certificate_conditions(self) -> bool:
-        """Whether what differs besides the beam is provided for by ``TRANSPORT_CONDITIONS``.
-
-        Their acceleration errors are for what happens within a control period, before the wrapper
-        counters it (docs/derivations.md, section 5). A late command acts as a disturbance of its
-        own size, and noisy sensors leave open whether a start is within the initial swing. The beam
-        is ``Certificate.covers``' matter.
-        """
-        own, paper = self.disturbance, PAPER_DISTURBANCE
-        is_noisy = own.force_sensor_noise_n > 0 or own.swing_sensor_noise_rad > 0
-        is_slow = own.force_frequency_rad_s <= paper.force_frequency_rad_s
-        has_small_forces = (
-            abs(own.force_bias_n) <= abs(paper.force_bias_n)
-            and abs(own.force_amplitude_n) <= abs(paper.force_amplitude_n)
-            and (is_slow or own.force_amplitude_n == 0)
-        )
-        return self.delay_periods == 0 and not is_noisy and has_small_forces
 
     @property
     def beam(self) -> BeamParams:

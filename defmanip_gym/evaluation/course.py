@@ -30,7 +30,7 @@ class Course:
         reward: (K,).
         intervened: whether the certificate changed the action, (K,); None without certificate.
         intervention_m_s2: by how much, (K,); None without certificate.
-        certificate_applies: whether it covers beam and start; None without certificate.
+        certificate_applies: whether it covered the episode to its end; None without certificate.
         reached_goal: whether the last moment is a success.
         left_workspace: whether it is outside of the workspace.
         simulation_failed: whether the simulation diverged.
@@ -88,7 +88,8 @@ class CourseRecorder:
             "applied": np.empty((*periods, 3)),
             "reward": np.empty(periods),
         }
-        self._applies: BoolArray | None = info.get("certificate_applies")
+        applies: BoolArray | None = info.get("certificate_applies")
+        self._applies = None if applies is None else applies.copy()
         if self._applies is not None:
             self._periods |= {name: np.empty(periods) for name in _INTERVENTIONS}
         self._ends = {name: np.zeros(count, dtype=bool) for name in _END_FLAGS}
@@ -119,6 +120,8 @@ class CourseRecorder:
             kept[:, self._steps] = values[name]
         self._steps += 1
         self._lengths[running] = self._steps
+        if self._applies is not None:
+            self._applies[running] = info["certificate_applies"][running]
         for name, key in _END_FLAGS.items():
             self._ends[name][running] = info[key][running]
         self._keep_moment(observation, info)

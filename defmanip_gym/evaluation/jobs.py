@@ -77,7 +77,6 @@ def job_fingerprint(
             "horizon_s": suite.horizon_s,
             "environments": [asdict(condition.environment) for condition in suite.conditions],
             "scenarios": suite.digest,
-            "certifiable": [c.within_certificate_conditions for c in suite.conditions],
             "controller": controller.identity,
             "certificate": certificate_identity(certificate),
         }

@@ -48,9 +48,6 @@ def episode_record(
     largest_swing = float(sigma_rad - course.margin_rad.min())
     violated = largest_swing > sigma_rad
     outcome = _outcome(course, violated)
-    covered = course.certificate_applies
-    if covered is not None:
-        covered = covered and scenario.condition.within_certificate_conditions
     return EpisodeRecord(
         suite=entry.suite,
         scenario=scenario.name,
@@ -75,7 +72,7 @@ def episode_record(
         path_length_m=float(_norm(path).sum()),
         interventions=_mean(course.intervened),
         mean_intervention_m_s2=_mean(course.intervention_m_s2),
-        certificate_applies=covered,
+        certificate_applies=course.certificate_applies,
         return_=float(course.reward.sum()),
     )
 

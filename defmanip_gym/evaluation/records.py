@@ -47,8 +47,8 @@ class EpisodeRecord:
         interventions: share of steps in which the ν_max wrapper changed the command; None
             without wrapper.
         mean_intervention_m_s2: mean change of the command over all steps; None without wrapper.
-        certificate_applies: whether the certificate covers the plant's beam and this start, and
-            the condition keeps to what it takes for granted; None without wrapper.
+        certificate_applies: whether all that the certificate takes for granted held to the end,
+            as the wrapper tells; None without wrapper.
         return_: undiscounted sum of rewards.
         package_version: of defmanip_gym.
         env_id: of the environment.

@@ -42,6 +42,7 @@ class Episode:
 class AppliedActions(gymnasium.vector.VectorWrapper[Array, Array, Array, Array, Array]):
     """Keeps the actions that arrive here: those that take effect."""
 
+    keeps_actions = True
     actions: Array
 
     def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:

@@ -14,7 +14,7 @@ from defmanip_gym.envs.deform_transport import DeformTransportEnv
 from defmanip_gym.evaluation.conditions import Condition
 from defmanip_gym.evaluation.contestants import Contestant
 from defmanip_gym.files import write_atomically
-from defmanip_gym.wrappers.nu_max_scaling import ActionScaling
+from defmanip_gym.wrappers.action_scaling import ActionScaling
 
 TIMING_FILE = "timings.json"  # in the output folder
 
@@ -39,6 +39,7 @@ def decision_time_s(contestant: Contestant) -> float:
         actions, state = controller.predict(observation, state, episode_start, deterministic=True)
         if scaling is not None:
             scaling.scale(actions, observation)
+            scaling.conclude(observation)
         samples.append(time.perf_counter() - begin)
     return median(samples[_WARM_UP:])
 

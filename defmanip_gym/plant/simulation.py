@@ -116,6 +116,26 @@ class Simulation:
         angles = np.concatenate((pose, joints, swing), axis=1, dtype=np.float64)
         _place(ids, angles, self._position)
 
+    def move(
+        self,
+        ids: NDArray[np.intp],
+        base_velocity: Array,
+        joint_rates: Array,
+        swing_rate: Array,
+    ) -> None:
+        """Set simulations in motion: (u1, u2) (k, 2), q̇_a (k, 2), φ̇ (k, N)."""
+        heading = self._position[ids, 2]
+        absolute = np.concatenate((joint_rates.sum(axis=1, keepdims=True), swing_rate), axis=1)
+        self._velocity[ids] = np.column_stack(
+            (
+                np.cos(heading) * base_velocity[:, 0],
+                np.sin(heading) * base_velocity[:, 0],
+                base_velocity[:, 1],
+                joint_rates,
+                np.diff(absolute, axis=1),
+            )
+        )
+
     def report(self, ids: NDArray[np.intp], grasp_force_b: Array) -> None:
         """Let ``read`` report a known grasp force, (k, 3) N, until the next step."""
         _sense(ids, self._position, grasp_force_b, self._grasp_force_s)

@@ -13,7 +13,7 @@ III        ``passivity`` Lemma III.1; ``zero_dynamics`` (12)–(16); ``controlla
            ``low_gain`` (24)–(26); ``iss_gain`` (17), (21); ``acceleration_budget`` (19), (31)
 III, on    ``certificates``, ``certificate``, ``conditions``: the ladder of bounds, built of
            ``peak_bounds`` (18), ``impulse_response``, ``small_gain``, ``worst_case``, ``limits``,
-           ``phase_plane``, ``nonlinear_margin``
+           ``phase_plane``, ``nonlinear_margin``; ``error_budget``, what sampling costs of it
 IV         ``control_laws`` (20), (27), (29); ``certified_command`` Remark IV.1;
            ``velocity_field`` IV.A; ``redundancy``, ``pseudoinverse_resolution`` IV.B;
            ``feedback_linearization`` (28)

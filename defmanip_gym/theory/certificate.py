@@ -16,6 +16,9 @@ Proof = Literal["nonlinear", "linear", "none"]
 Deformable = BeamParams | LinearizedObject
 _Pairs = tuple[tuple[float, float], ...]
 
+# Sampled feedback linearization overshoots a rate by a fraction of a percent.
+_COMMANDED_YAW_SHARE = 0.98
+
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
@@ -96,6 +99,11 @@ class Certificate:
         """Largest commanded vertical acceleration, m/s²."""
         conditions = self.conditions
         return max(conditions.vertical_acceleration_m_s2 - conditions.vertical_error_m_s2, 0.0)
+
+    @property
+    def commanded_yaw_rate_rad_s(self) -> float:
+        """Largest yaw rate that is asked for; a sampled robot overshoots it."""
+        return _COMMANDED_YAW_SHARE * self.conditions.yaw_rate_rad_s
 
     @cached_property
     def nonlinear_limit(self) -> float | None:

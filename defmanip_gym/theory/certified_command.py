@@ -14,9 +14,6 @@ from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.control_laws import limit_speed
 
-# Sampled feedback linearization overshoots a rate by a fraction of a percent.
-_YAW_RATE_SHARE = 0.98
-
 
 def certified_command(
     w: Array,
@@ -53,20 +50,34 @@ def certified_command(
     reach_rate = grasp_velocity[..., 0] - u1
     # leftward acceleration = ρ u̇2 + 2 ρ̇ u2 + u1 u2
     centripetal = 2 * reach_rate * u2 + u1 * u2
-    rate = _YAW_RATE_SHARE * certificate.conditions.yaw_rate_rad_s
+    rate = certificate.commanded_yaw_rate_rad_s
     rightmost = reach * (-rate - u2) / period_s + centripetal
     leftmost = reach * (rate - u2) / period_s + centripetal
-    resulting = np.stack(
-        (
-            np.clip(limited[..., 0], -forward, forward),
-            np.clip(limited[..., 1], rightmost, leftmost),
-            np.clip(limited[..., 2], -upward, upward),
-        ),
-        axis=-1,
+    low = np.stack(np.broadcast_arrays(-forward, rightmost, -upward), axis=-1)
+    high = np.stack(np.broadcast_arrays(forward, leftmost, upward), axis=-1)
+    command = np.clip(limited, low, high) - disturbance
+    low, high = low - disturbance, high - disturbance
+    coasting = _coasting(low, high, grasp_velocity, speed, period_s)
+    return _slowed(command, coasting, grasp_velocity, speed, period_s)
+
+
+def _coasting(low: Array, high: Array, velocity: Array, limit: float, period_s: float) -> Array:
+    """Return the command nearest to none within bounds (..., 3) that the speed limit leaves alone.
+
+    The environment's limiter sees the command without the disturbance that it makes up for. Where
+    holding the other axes alone would exceed the limit, the forward one brakes.
+    """
+    coasting = np.clip(0.0, low, high)
+    allowed = np.maximum(limit**2, _square(velocity))
+    others = _square((velocity + period_s * coasting)[..., 1:])
+    speed = np.sqrt(np.maximum(allowed - others, 0.0))
+    slowed = np.clip(
+        coasting[..., 0],
+        (-speed - velocity[..., 0]) / period_s,
+        (speed - velocity[..., 0]) / period_s,
     )
-    coasting = np.zeros_like(resulting)
-    coasting[..., 1] = np.clip(0.0, rightmost, leftmost)
-    return _slowed(resulting - disturbance, coasting - disturbance, grasp_velocity, speed, period_s)
+    coasting[..., 0] = np.clip(slowed, low[..., 0], high[..., 0])
+    return coasting
 
 
 def _slowed(

@@ -14,7 +14,8 @@ from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.hyperparameters import built, components
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.validation import require_between, require_whole
-from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling, transport_config
+from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
+from defmanip_gym.wrappers.transport import transport_config
 
 _EVALUATION_BATCH = 64
 

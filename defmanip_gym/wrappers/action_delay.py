@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from defmanip_gym.validation import require_whole
-from defmanip_gym.wrappers.nu_max_scaling import finite_actions
+from defmanip_gym.wrappers.transport import finite_actions
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -40,6 +40,11 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
         self._under_way = np.zeros((periods, *shape))  # the first is the next to take effect
         self._ended = np.zeros(env.num_envs, dtype=bool)
         self._is_started = False
+
+    @property
+    def keeps_actions(self) -> bool:
+        """Whether every action arrives as it was sent."""
+        return self.periods == 0
 
     def reset(
         self,

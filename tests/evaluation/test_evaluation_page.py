@@ -18,6 +18,7 @@ from defmanip_gym.evaluation.statistics.resampling import RESAMPLES
 from defmanip_gym.evaluation.store import _HEADER_FIELDS
 from defmanip_gym.evaluation.suites import HORIZON_S, SUITES
 from defmanip_gym.task_params import TaskParams
+from defmanip_gym.wrappers.applicability import Applicability
 
 PAGE = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
 CERTIFICATES = Certificates()
@@ -32,7 +33,8 @@ def row(suite, condition):
     noises = ((own.force_sensor_noise_n, "N"), (own.swing_sensor_noise_rad, "rad"))
     factors = (condition.damping_factor, condition.mass_factor, condition.length_factor)
     certificate = CERTIFICATES.named(CERTIFICATE_OPTION)
-    covered = condition.within_certificate_conditions and certificate.covers(condition.beam)
+    delayed = ("ActionDelay",) if condition.delay_periods else ()
+    covered = not Applicability(condition.environment, certificate, delayed).configuration_reason
     cells = (
         suite.name,
         f"`{condition.name}`",
