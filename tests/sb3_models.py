@@ -9,6 +9,7 @@ import cloudpickle
 import gymnasium
 import numpy as np
 from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 
 class Spaces(gymnasium.Env):
@@ -25,6 +26,22 @@ class Spaces(gymnasium.Env):
         return self.reset()[0], 0.0, False, False, {}
 
 
+class Turning(Spaces):
+    """Observations with a heading, as the environment's, and noise elsewhere."""
+
+    def reset(self, *, seed=None, options=None):
+        self.generator = np.random.default_rng(seed)
+        return self.observation(), {}
+
+    def step(self, action):
+        return self.observation(), 0.0, False, False, {}
+
+    def observation(self):
+        observation, angle = self.generator.normal(2.0, 3.0, 22), self.generator.normal()
+        observation[3:5] = np.sin(angle), np.cos(angle)
+        return observation.astype(np.float32)
+
+
 class Payload:
     """Unpickling it makes a folder."""
 
@@ -38,6 +55,18 @@ class Payload:
 def saved(path, algorithm=PPO, env=None):
     model = algorithm("MlpPolicy", env or Spaces(), device="cpu", policy_kwargs={"net_arch": [8]})
     model.save(path)
+    return model
+
+
+def trained(algorithm, normalization=None, callback=None):
+    """Train for some steps, inside VecNormalize with these arguments, if any."""
+    env = DummyVecEnv([Turning])
+    if normalization is not None:
+        env = VecNormalize(env, **normalization)
+    options = {"n_steps": 8, "batch_size": 8} if algorithm is PPO else {"learning_starts": 8}
+    kwargs = {"policy_kwargs": {"net_arch": [8]}, "device": "cpu"} | options
+    model = algorithm("MlpPolicy", env, **kwargs)
+    model.learn(16, callback=callback)
     return model
 
 

@@ -74,7 +74,12 @@ def _contestants(config: ComparisonConfig) -> tuple[Contestant, ...]:
     wanted = standard_names() if config.contestants is None else config.contestants
     chosen = standard_contestants(wanted, certificates, config.member_limit)
     guests = chain.from_iterable(
-        agent_contestants(path, certificates, allow_pickle=config.allow_pickle)
+        agent_contestants(
+            path,
+            certificates,
+            allow_pickle=config.allow_pickle,
+            normalization=config.normalization,
+        )
         for path in config.agents
     )
     by_name = {contestant.name: contestant for contestant in (*chosen, *guests)}

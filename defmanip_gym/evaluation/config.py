@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.suites import SUITE_NAMES, Suite, suite_named
 from defmanip_gym.validation import require_choice, require_whole
 
@@ -43,8 +44,11 @@ class ComparisonConfig:
     agents: tuple[Path, ...] = ()
     """Run folders or .safetensors files of further agents, run without and with certificate."""
     allow_pickle: bool = False
-    """Also take zip files of SB3 and rl_zoo3 as --agents, with the vecnormalize.pkl beside them.
+    """Also take zip files of SB3 and rl_zoo3 as --agents, with the VecNormalize files beside them.
     Loading one runs whatever code its maker put in, with your rights: only for files you trust."""
+    normalization: str | None = None
+    """VecNormalize file of the only agent, a zip file, or "none"; looked for beside it by
+    default."""
     jobs: int | None = None
     """Processes; as many as cores by default, 1 stays in this one."""
     fresh: bool = False
@@ -57,6 +61,13 @@ class ComparisonConfig:
             value = getattr(self, name)
             if value != _ALL:
                 require_whole(name, value, 1)
+        if self.normalization is not None and not (self.allow_pickle and len(self.agents) == 1):
+            raise ParameterError(
+                "normalization",
+                self.normalization,
+                "none unless --agents names one zip file, with --allow-pickle",
+                "Compare several by putting the statistics of each beside it.",
+            )
         if self.jobs is not None:
             require_whole("jobs", self.jobs, 1)
 

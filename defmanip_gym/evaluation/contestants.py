@@ -124,7 +124,11 @@ def standard_contestants(
 
 
 def agent_contestants(
-    path: Path, certificates: Certificates, *, allow_pickle: bool = False
+    path: Path,
+    certificates: Certificates,
+    *,
+    allow_pickle: bool = False,
+    normalization: str | None = None,
 ) -> tuple[Contestant, Contestant]:
     """Return an agent of the user's, without and with the certificate.
 
@@ -134,12 +138,17 @@ def agent_contestants(
         path: run folder or file.
         certificates: where its certificate comes from.
         allow_pickle: take SB3's zip files, too, which run whatever code their maker put in.
+        normalization: of a zip file, as for ``load_sb3_zip``.
 
     Raises:
         AgentFileError: the agent cannot be loaded or does not fit the environment.
     """
     if allow_pickle and is_sb3_zip(path):
-        return _sb3_contestants(path, certificates)
+        return _sb3_contestants(path, certificates, normalization)
+    if normalization is not None:
+        raise AgentFileError(
+            "normalization", normalization, f"nothing with {path}", "It is no zip file of SB3."
+        )
     actor = load_agent(path)
     folder = path.resolve() if path.is_dir() else path.resolve().parent
     name = f"{folder.name}@{actor.digest}"
@@ -151,8 +160,11 @@ def agent_contestants(
     )
 
 
-def _sb3_contestants(path: Path, certificates: Certificates) -> tuple[Contestant, Contestant]:
-    model = load_sb3_zip(path)
+def _sb3_contestants(
+    path: Path, certificates: Certificates, normalization: str | None
+) -> tuple[Contestant, Contestant]:
+    model = load_sb3_zip(path, normalization)
+    spec = Sb3Zip(path.resolve(), model.digest, normalization)
     name = f"{path.stem}@{model.digest}"
     _require_fit(name, model.observation_size, _ACTION_SIZE)
     about = f"{model.algorithm.upper()} model of Stable-Baselines3 in {path}"
@@ -162,7 +174,7 @@ def _sb3_contestants(path: Path, certificates: Certificates) -> tuple[Contestant
         description=f"{about}.",
         privileged="what its training saw is not known",
         colour=GUEST_COLOURS[0],
-        members=(Member(name=SOLE_MEMBER, controller=Sb3Zip(path.resolve(), model.digest)),),
+        members=(Member(name=SOLE_MEMBER, controller=spec),),
     )
     return plain, replace(
         plain,

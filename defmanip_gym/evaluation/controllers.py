@@ -125,10 +125,12 @@ class Sb3Zip:
     Attributes:
         path: of the zip file, absolute; its process must find it there.
         digest: of the model and its normalization.
+        normalization: as for ``load_sb3_zip``.
     """
 
     path: Path
     digest: str
+    normalization: str | None = None
 
     def build(self, seeds: Sequence[int]) -> Controller:
         """Return the controller.
@@ -136,7 +138,7 @@ class Sb3Zip:
         Raises:
             AgentFileError: the file is gone, or another than when the comparison began.
         """
-        controller = load_sb3_zip(self.path)
+        controller = load_sb3_zip(self.path, self.normalization)
         if controller.digest != self.digest:
             raise AgentFileError(
                 f"digest of {self.path}",

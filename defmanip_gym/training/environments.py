@@ -8,7 +8,7 @@ import gymnasium
 from stable_baselines3.common.vec_env import VecNormalize
 
 from defmanip_gym.errors import DefmanipError, ParameterError
-from defmanip_gym.evaluation.seeds import LARGEST_BATCH, VALIDATION_SEED, training_seed
+from defmanip_gym.evaluation.seeds import LARGEST_BATCH, VALIDATION_SEED
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.hyperparameters import built, components
@@ -24,15 +24,21 @@ def make_training_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> V
     """Return the normalized SB3 face of the batched environment, seeded.
 
     Raises:
-        ParameterError: wrappers or arguments that cannot be used.
+        ParameterError: wrappers or arguments that cannot be used, or seeds kept for validation.
     """
     count = hyperparameters["n_envs"]
     require_whole("n_envs", count, 1)
     require_between("n_envs", count, 0, LARGEST_BATCH)
+    if config.seed + count > VALIDATION_SEED:
+        raise ParameterError(
+            "seed",
+            config.seed,
+            f"0 <= seed <= {VALIDATION_SEED - count}",
+            "Each episode of the batch has a seed from it on; those above are kept for evaluation.",
+        )
     venv = VecNormalize(_sb3_env(config, hyperparameters, count), norm_reward=True)
     venv.gamma = float(hyperparameters.get("gamma", 0.99))
-    # a seed of its own for every episode generator of every run
-    venv.seed(training_seed(config.seed))
+    venv.seed(config.seed)  # episode i with seed + i, as SB3's models do, too
     return venv
 
 

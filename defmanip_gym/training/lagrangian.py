@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
@@ -49,13 +51,13 @@ class LagrangianPenalty(BaseCallback):
         self._running = np.zeros(0)  # cost so far of the episodes that run
         self._ended: list[float] = []
 
-    def state(self) -> dict[str, float]:
-        """Return what a checkpoint keeps."""
-        return {"multiplier": self.multiplier}
+    def state(self) -> dict[str, Any]:
+        """Return what a checkpoint keeps: the price and, per episode, (n,), the cost so far."""
+        return {"multiplier": self.multiplier, "running": self._running}
 
-    def set_state(self, state: dict[str, float]) -> None:
+    def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what ``state`` returned."""
-        self.multiplier = float(state["multiplier"])
+        self.multiplier, self._running = state["multiplier"], state["running"]
 
     def _on_training_start(self) -> None:
         if not isinstance(self.model, OnPolicyAlgorithm):
@@ -65,7 +67,10 @@ class LagrangianPenalty(BaseCallback):
                 "an on-policy one, such as PPO",
                 "Replayed rewards would hold outdated multipliers.",
             )
-        self._running = np.zeros(self.training_env.num_envs)
+        fresh: Any = self.model._last_episode_starts
+        if len(self._running) != len(fresh):
+            self._running = np.zeros(len(fresh))
+        self._running = np.where(fresh, 0.0, self._running)
 
     def _on_step(self) -> bool:
         costs = np.array([info.get("cost", 0.0) for info in self.locals["infos"]])

@@ -136,6 +136,24 @@ class Sb3VecEnv(VecEnv):
             self.reset_infos[i] = first
         return endings
 
+    def get_state(self) -> dict[str, Any] | None:
+        """Return what the running episodes' future depends on; None where the batch cannot tell.
+
+        So it is before the first reset, too.
+        """
+        is_fresh = any(seed is not None for seed in self._seeds)
+        if is_fresh or not hasattr(self.env, "get_state"):
+            return None
+        tallies = [tally.copy() for tally in (self._returns, self._lengths, self._costs)]
+        return {"tallies": tallies, "batch": self.env.get_state()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what ``get_state`` returned."""
+        self._returns, self._lengths, self._costs = state["tallies"]
+        self.env.set_state(state["batch"])  # type: ignore[attr-defined]
+        self._reset_seeds()
+        self._reset_options()
+
     def close(self) -> None:
         """Close the batch."""
         self.env.close()

@@ -12,23 +12,19 @@ import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import CallbackList
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger, make_output_format
 from stable_baselines3.common.vec_env import VecNormalize
 
 from defmanip_gym.baselines.learned.agents import RUN_AGENT
 from defmanip_gym.baselines.learned.card import AgentCard, Normalization
 from defmanip_gym.errors import RunFolderError
-from defmanip_gym.evaluation.seeds import training_seed
-from defmanip_gym.training.callbacks import Periodically, Resumable
-from defmanip_gym.training.checkpoint import (
-    observation_statistics,
-    read_checkpoint,
-    write_checkpoint,
-)
+from defmanip_gym.training.callbacks import Checkpoints, progress_bar, stop_on_ctrl_c
+from defmanip_gym.training.checkpoint import planned_timesteps, read_checkpoint, write_checkpoint
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.environments import make_evaluation_env, make_training_env
 from defmanip_gym.training.export import actor_modules, hidden_activation, residual_of, to_actor
 from defmanip_gym.training.hyperparameters import load_hyperparameters
+from defmanip_gym.training.learner_state import observation_statistics
 from defmanip_gym.training.model import build_model, callbacks_of
 from defmanip_gym.training.run_folder import LAST_AGENT, RunFolder
 from defmanip_gym.training.validation_callback import ValidationCallback
@@ -38,7 +34,8 @@ from defmanip_gym.version import __version__
 def train(config: TrainConfig) -> Path:
     """Train, or go on training, and return the run folder.
 
-    Ctrl-C saves a checkpoint and exits with 130 after saying how to go on.
+    Ctrl-C saves a checkpoint before the next rollout and exits with 130 after saying how to go on;
+    a second one, and a ``KeyboardInterrupt`` from elsewhere, exit at once.
 
     Raises:
         ParameterError: hyperparameters that cannot be used.
@@ -48,55 +45,64 @@ def train(config: TrainConfig) -> Path:
     torch.set_num_threads(1)  # physics uses the other cores
     venv = make_training_env(config, hyperparameters)
     model = build_model(config.algo, config.seed, hyperparameters, venv)
+    model.set_logger(Logger(None, []))  # its files follow once it is known where the run stands
     total = config.total_timesteps or int(hyperparameters["n_timesteps"])
     interval = max(1, total // config.evaluations)
     evaluation = make_evaluation_env(config, hyperparameters)
     callbacks = callbacks_of(hyperparameters)
     # only now: a folder of what cannot be trained would look like a run
     folder = _folder(config, hyperparameters)
-    validation = ValidationCallback(
-        evaluation,
-        episodes=config.evaluation_episodes,
-        interval=interval // venv.num_envs,
-        on_best=lambda: export(folder, RUN_AGENT, config, model, venv),
+    callbacks.append(
+        ValidationCallback(
+            evaluation,
+            episodes=config.evaluation_episodes,
+            interval=interval // venv.num_envs,
+            on_best=lambda: export(folder, RUN_AGENT, config, model, venv),
+        )
     )
-    callbacks.append(validation)
-    resumable = [callback for callback in callbacks if isinstance(callback, Resumable)]
     if config.resume is not None:
-        read_checkpoint(folder.last_checkpoint(), model, venv, resumable)
-        # other starts than those of the part before
-        venv.seed(training_seed(config.seed, model.num_timesteps))
+        read_checkpoint(folder.last_checkpoint(), model, venv, callbacks)
     if model.num_timesteps >= total:
         venv.close()
         return folder.path
-    # a part of its own for every start of the run: SB3's writers begin their files anew
-    curves = str(folder.path / "curves" / f"from-{model.num_timesteps:010d}")
-    model.set_logger(configure(curves, ["csv", "tensorboard"]))
+    _begin_curves(model.logger, folder, model.num_timesteps)
 
     def save() -> None:
         folder.save_checkpoint(
-            model.num_timesteps, lambda path: write_checkpoint(path, model, venv, resumable)
+            model.num_timesteps,
+            lambda path: write_checkpoint(path, model, venv, callbacks, total),
         )
         export(folder, LAST_AGENT, config, model, venv)
 
     try:
-        model.learn(
-            total - model.num_timesteps,
-            callback=CallbackList([*callbacks, Periodically(save, interval)]),
-            reset_num_timesteps=False,
-            progress_bar=True,
-        )
+        with stop_on_ctrl_c() as stop, progress_bar() as bar:
+            model.learn(
+                total - model.num_timesteps,
+                callback=CallbackList([*callbacks, Checkpoints(save, interval, stop), bar]),
+                reset_num_timesteps=False,
+            )
+            save()
     except KeyboardInterrupt:
-        save()
-        print(
-            f"Stopped at {model.num_timesteps} steps. Go on with: "
-            f"python train.py --resume {folder.path}"
-        )
+        print(f"Stopped at {model.num_timesteps} steps. {_how_to_go_on(folder)}")
         raise SystemExit(130) from None
     finally:
         venv.close()
-    save()
     return folder.path
+
+
+def _begin_curves(logger: Logger, folder: RunFolder, timesteps: int) -> None:
+    """Let a logger write a part of its own for every start of a run: its files begin anew."""
+    part = str(folder.path / "curves" / f"from-{timesteps:010d}")
+    logger.dir = part
+    logger.output_formats = [make_output_format(kind, part) for kind in ("csv", "tensorboard")]
+
+
+def _how_to_go_on(folder: RunFolder) -> str:
+    try:
+        checkpoint = folder.last_checkpoint()
+    except RunFolderError:
+        return "There is no checkpoint yet: start the run anew."
+    return f"Go on from {checkpoint.name} with: python train.py --resume {folder.path}"
 
 
 def export(
@@ -140,7 +146,7 @@ def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any]]:
             f"{__version__}, as installed",
             "Environment or reward may differ: install the run's version, or train anew.",
         )
-    total = config.total_timesteps or stored.train.total_timesteps
+    total = config.total_timesteps or planned_timesteps(RunFolder(config.resume).last_checkpoint())
     return (
         replace(stored.train, resume=config.resume, total_timesteps=total),
         stored.hyperparameters,

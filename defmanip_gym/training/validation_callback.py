@@ -9,6 +9,10 @@ import numpy as np
 from stable_baselines3.common.callbacks import EvalCallback
 from stable_baselines3.common.vec_env import VecEnv
 
+from defmanip_gym.training.environment_state import environment_state, set_environment_state
+
+_KEPT = ("score", "best_score", "last_mean_reward", "best_mean_reward")
+
 
 class ValidationCallback(EvalCallback):
     """Evaluates the deterministic policy at intervals, and tells when it has become better.
@@ -45,13 +49,17 @@ class ValidationCallback(EvalCallback):
         self._on_best = on_best
         self._episode_scores: list[float] = []
 
-    def state(self) -> dict[str, float]:
-        """Return what a checkpoint keeps."""
-        return {"best_score": self.best_score}
+    def state(self) -> dict[str, Any]:
+        """Return what a checkpoint keeps: scores, and where the evaluations' starts stand."""
+        return {name: getattr(self, name) for name in _KEPT} | {
+            "environment": environment_state(self.eval_env)
+        }
 
-    def set_state(self, state: dict[str, float]) -> None:
+    def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what ``state`` returned."""
-        self.best_score = float(state["best_score"])
+        for name in _KEPT:
+            setattr(self, name, state[name])
+        set_environment_state(self.eval_env, state["environment"])
 
     def _log_success_callback(self, locals_: dict[str, Any], globals_: dict[str, Any]) -> None:
         super()._log_success_callback(locals_, globals_)

@@ -10,9 +10,12 @@ import yaml
 from defmanip_gym.baselines.learned.agents import load_agent
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import AgentFileError, ParameterError, RunFolderError
+from defmanip_gym.evaluation.seeds import VALIDATION_SEED
 from defmanip_gym.training import train as training
 from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.environments import make_training_env
 from defmanip_gym.training.hyperparameters import load_hyperparameters
+from defmanip_gym.training.model import build_model
 from defmanip_gym.training.run_folder import RunFolder
 
 RESIDUAL = "defmanip_gym.baselines.residual_action.ResidualAction"
@@ -62,6 +65,17 @@ def test_unusable_hyperparameters_are_refused_by_name_and_leave_nothing(change, 
     with pytest.raises(ParameterError, match=named):
         training.train(settings)
     assert not settings.output.exists()
+
+
+def test_no_run_trains_on_starts_that_agents_are_judged_on(config):
+    settings = config(seed=VALIDATION_SEED - 3)  # four episodes
+    with pytest.raises(ParameterError, match="seed"):
+        training.train(settings)
+    assert not settings.output.exists()
+    venv = make_training_env(replace(settings, seed=VALIDATION_SEED - 4), {"n_envs": 4})
+    model = build_model("ppo", VALIDATION_SEED - 4, load_hyperparameters(None, "ppo", ENV_ID), venv)
+    assert model.env.venv._seeds[-1] == VALIDATION_SEED - 1
+    venv.close()
 
 
 def test_incomplete_hyperparameters_are_refused_and_leave_nothing(config, tmp_path):

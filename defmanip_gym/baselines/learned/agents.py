@@ -77,19 +77,22 @@ def load_agent(name: str | Path, library: Path = SHIPPED) -> MlpActor:
     )
 
 
-def load_controller(name: str | Path, *, allow_pickle: bool = False) -> Controller:
+def load_controller(
+    name: str | Path, *, allow_pickle: bool = False, normalization: str | None = None
+) -> Controller:
     """Load an agent as the controller it stands for.
 
     Args:
         name: as for :func:`load_agent`.
         allow_pickle: take SB3's zip files, too, which run whatever code their maker put in.
+        normalization: of a zip file, as for :func:`~.sb3_zip.load_sb3_zip`.
 
     Raises:
         AgentFileError: nothing there, not an agent, or a zip file that is not allowed.
     """
     path = Path(name)
     if allow_pickle and is_sb3_zip(path):
-        return load_sb3_zip(path)
+        return load_sb3_zip(path, normalization)
     return controller_of(load_agent(name))
 
 

@@ -7,7 +7,7 @@ import importlib
 import json
 import pickle
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.controller import State
-from defmanip_gym.envs.registration import ENV_IDS
+from defmanip_gym.baselines.learned.sb3_normalization import (
+    missing_normalization,
+    normalization_of,
+    was_normalized,
+)
 from defmanip_gym.errors import AgentFileError
 
 Array = NDArray[np.float64]
 
-NORMALIZATION = "vecnormalize.pkl"
 # A setting that a model of this class has and those after it have not; recurrent and maskable
 # PPO, which differ, have policies outside of SB3 itself.
 _MARKS = {
@@ -71,14 +74,18 @@ class Sb3Controller:
         return np.asarray(action, dtype=np.float64), state
 
 
-def load_sb3_zip(path: Path) -> Sb3Controller:
+def load_sb3_zip(path: Path, normalization: str | None = None) -> Sb3Controller:
     """Load a PPO, SAC, TQC or TD3 model, unpickling it: only call this for files you trust.
 
-    Observations are normalized by the ``vecnormalize.pkl`` that lies beside the zip file or, as
-    rl_zoo3 leaves it, in a folder beside it that has the environment's or the zip file's name.
+    Args:
+        path: the zip file.
+        normalization: the file of the ``VecNormalize`` that it was trained with, or "none"; by
+            default it is looked for beside the zip file, under the names that SB3 and rl_zoo3 give
+            it. It is unpickled, too.
 
     Raises:
-        AgentFileError: no model of these, a damaged one, one for other spaces, or no SB3 here.
+        AgentFileError: no model of these, a damaged one, one for other spaces, one whose
+            normalization is missing or not clear, or no SB3 here.
     """
     name = _algorithm(path)
     try:
@@ -90,23 +97,34 @@ def load_sb3_zip(path: Path) -> Sb3Controller:
             f"a model of {_MARKS[name][0]}, which is not installed",
             "Install it with: pip install 'defmanip_gym[train]'.",
         ) from error
-    statistics = _normalization_path(path)
+    model = _unpickled(path, name, lambda: getattr(module, name).load(path, device="cpu"))
+    normalized = was_normalized(model)
+    statistics = normalization_of(path, normalization, normalized)
+    normalize = None
+    if statistics is not None:
+        normalize = _unpickled(
+            statistics, "VecNormalize", lambda: pickle.loads(statistics.read_bytes())
+        )
+    if not getattr(normalize, "norm_obs", True):
+        normalize = None  # it normalized rewards only
+    if normalized and normalize is None:
+        raise missing_normalization(path)
+    _check_spaces(model, normalize, path)
+    digest = hashlib.sha256(path.read_bytes())
+    digest.update(b"" if statistics is None else statistics.read_bytes())
+    return Sb3Controller(model, normalize, digest.hexdigest()[:8])
+
+
+def _unpickled(path: Path, kind: str, load: Callable[[], Any]) -> Any:
     try:
-        model = getattr(module, name).load(path, device="cpu")
-        normalization = None if statistics is None else pickle.loads(statistics.read_bytes())
-        if not getattr(normalization, "norm_obs", True):
-            normalization = None  # it normalized rewards only
+        return load()
     except Exception as error:  # a foreign pickle can raise anything
         raise AgentFileError(
             "agent",
             str(path),
-            f"a {name} model with its normalization",
+            f"a {kind} that SB3 saved",
             f"It is damaged or of another version: {type(error).__name__}: {error}.",
         ) from error
-    _check_spaces(model, normalization, path)
-    digest = hashlib.sha256(path.read_bytes())
-    digest.update(b"" if statistics is None else statistics.read_bytes())
-    return Sb3Controller(model, normalization, digest.hexdigest()[:8])
 
 
 def _algorithm(path: Path) -> str:
@@ -131,13 +149,6 @@ def _class_of(settings: Mapping[str, Any], policy: str, path: Path) -> str:
     )
 
 
-def _normalization_path(path: Path) -> Path | None:
-    folders = [path.with_name(path.name.removesuffix(".zip")), path.parent]
-    folders += [path.parent / env_id for env_id in ENV_IDS]
-    found = (folder / NORMALIZATION for folder in folders)
-    return next((candidate for candidate in found if candidate.is_file()), None)
-
-
 def _check_spaces(model: Any, normalization: Any, path: Path) -> None:
     """Raise AgentFileError unless all takes flat observations of one length and makes actions."""
     shape, actions = model.observation_space.shape, model.action_space
@@ -155,5 +166,5 @@ def _check_spaces(model: Any, normalization: Any, path: Path) -> None:
             "normalization",
             f"{path}: {type(normalization).__name__} of shape {np.shape(mean)}",
             f"VecNormalize with observations of {shape}",
-            f"Put the {NORMALIZATION} of the same training beside the zip file.",
+            "Put the statistics of the same training beside the zip file.",
         )
