@@ -32,12 +32,12 @@ def workspace_of(config: TransportConfig) -> Workspace:
     task = config.task
     return Workspace(
         arm=ArmLengths.of(config.robot),
-        center_x_m=float(task.goal[0]),
-        center_y_m=float(task.goal[1]),
-        arena_radius_m=float(task.arena_radius_m),
-        smallest_elbow_bend_rad=float(task.smallest_elbow_bend_rad),
-        smallest_reach_m=float(task.smallest_reach_m),
-        smallest_grasp_height_m=float(task.smallest_grasp_height_m),
+        center_x_m=task.goal[0],
+        center_y_m=task.goal[1],
+        arena_radius_m=task.arena_radius_m,
+        smallest_elbow_bend_rad=task.smallest_elbow_bend_rad,
+        smallest_reach_m=task.smallest_reach_m,
+        smallest_grasp_height_m=task.smallest_grasp_height_m,
     )
 
 
