@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -100,6 +100,14 @@ def require_range(
     raise ParameterError(name, ends, allowed, "Give two numbers, the smaller one first.")
 
 
+def require_array(name: str, values: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return a new array, or raise ParameterError unless ``values`` are numbers of that shape."""
+    array = number_array(values)
+    if array is None or array.shape != shape or not np.isfinite(array).all():
+        raise ParameterError(name, values, f"finite numbers of shape {shape}", "Check them.")
+    return array
+
+
 def require_items(name: str, values: object, kind: type[Item]) -> tuple[Item, ...]:
     """Return ``values``, or raise ParameterError unless they are a sequence of ``kind``."""
     items = _items(values)
@@ -184,6 +192,15 @@ def require_seeds(value: object, count: int) -> list[int | None]:
         allowed = f"a whole number >= 0, or {count} of them or None"
         raise SeedError("seed", value, allowed, "Give one per episode.")
     return [require_seed(seed) for seed in seeds]
+
+
+def plain(value: Any) -> Any:
+    """Return parameters as JSON holds them: mappings for dataclasses, lists for arrays, tuples."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, tuple | list):
+        return [plain(each) for each in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def settle(instance: object, name: str, require: Callable[..., object], *arguments: Any) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_MOST_PERIODS = 1000  # in one decision
+
 _ENDINGS = ("final_obs", "final_info", "_final_obs", "_final_info")
 
 
@@ -41,7 +45,7 @@ def residual_authority(
     Raises:
         ParameterError: an authority that is not positive.
     """
-    require_positive("authority", authority)
+    authority = require_positive("authority", authority)
     limit = config.task.max_acceleration_m_s2
     return min(authority * certificate.acceleration_bound / limit, 1.0)
 
@@ -76,7 +80,7 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
             raise ParameterError(
                 "autoreset_mode", mode, "AutoresetMode.SAME_STEP", "Make the batch in that mode."
             )
-        require_whole("decision_periods", decision_periods, 1)
+        decision_periods = require_whole("decision_periods", decision_periods, 1, _MOST_PERIODS)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxVectorActionScaling(env, bound))
         self._base, self._decision_periods = base, decision_periods
@@ -188,16 +192,25 @@ class ResidualAction(
         decision_periods: int = 1,
         authority: float = 1.0,
     ) -> None:
+        decision_periods = require_whole("decision_periods", decision_periods, 1, _MOST_PERIODS)
+        authority = require_positive("authority", authority)
         gymnasium.utils.RecordConstructorArgs.__init__(
             self, certificate=certificate, decision_periods=decision_periods, authority=authority
         )
-        require_whole("decision_periods", decision_periods, 1)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxActionScaling(env, bound))
         self._base, self._decision_periods = base, decision_periods
         self._authority = residual_authority(bound, transport_config(env), authority)
         self._state: State | None = None
         self._action: Array | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+        """How to make it again; the certificate's wrapper comes with it."""
+        spec = copy.deepcopy(self.env.env.spec)  # type: ignore[attr-defined]
+        if spec is not None:
+            spec.additional_wrappers += (self.wrapper_spec(**self._saved_kwargs),)
+        return spec
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -20,6 +20,7 @@ from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.certified_command import certified_command
 from defmanip_gym.theory.frames import base_to_world
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.validation import number_array, plain, require_params
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -67,6 +68,7 @@ class ActionScaling:
     """
 
     def __init__(self, config: TransportConfig, certificate: Certificate) -> None:
+        certificate = require_params("certificate", certificate, Certificate)
         if config.control_mode != "task":
             raise CertificateError(
                 "control_mode",
@@ -177,14 +179,15 @@ class NuMaxActionScaling(
 
     Args:
         env: a DeformTransport environment in task mode.
-        certificate: the bounds to enforce.
+        certificate: the bounds to enforce; or a mapping of its fields, as the JSON of a
+            specification holds it.
 
     Raises:
         CertificateError: the certificate does not fit the environment.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], certificate: Certificate) -> None:
-        gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=certificate)
+        gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=plain(certificate))
         super().__init__(env)
         self.scaling = ActionScaling(transport_config(env), certificate)
         self._observation: Array | None = None
@@ -295,13 +298,10 @@ def finite_actions(actions: Any, awake: BoolArray, shape: tuple[int, ...] = (3,)
         ActionError: actions that are not finite or of another shape.
     """
     shape = (len(awake), *shape)
-    try:
-        values = np.array(actions, dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape == shape:
+    values = number_array(actions)
+    if values is not None and values.shape == shape:
         values[~awake] = 0.0
-    if values.shape != shape or not np.isfinite(values).all():
+    if values is None or values.shape != shape or not np.isfinite(values).all():
         raise ActionError("action", actions, f"finite numbers of shape {shape}", "Check them.")
     return values
 
