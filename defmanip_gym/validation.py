@@ -76,6 +76,14 @@ def require_whole(name: str, value: object, low: int, high: int = _MOST) -> int:
     return int(number)
 
 
+def require_flag(name: str, value: object) -> bool:
+    """Return ``value``, or raise ParameterError unless it is True or False."""
+    flag = _unwrapped(value)
+    if not isinstance(flag, bool):
+        raise ParameterError(name, value, "True or False", "Choose one.")
+    return flag
+
+
 def require_finite_sequence(name: str, values: object, length: int) -> tuple[float, ...]:
     """Return ``values``, or raise ParameterError unless they are ``length`` numbers."""
     items = _items(values)

@@ -28,6 +28,7 @@ from defmanip_gym.theory.stability import SampledLoop
 from defmanip_gym.theory.velocity_field import LiteralField, NormalizedField, VelocityField
 from defmanip_gym.validation import (
     require_choice,
+    require_flag,
     require_number,
     require_params,
     require_positive,
@@ -82,6 +83,7 @@ class TannerParams:
             "deceleration_share",
         ):
             settle(self, name, require_positive)
+        settle(self, "feedforward", require_flag)
         settle(self, "gains", require_params, ForceLoopGains)
         settle(self, "force_law_damping", require_number, -1e4, 1e4, "N m s/rad")
 

@@ -12,7 +12,7 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.validation import require_array, require_instance, require_items, settle
+from defmanip_gym.validation import require_array, require_flag, require_items, settle
 
 _SQUARE = (
     "m_o22",
@@ -77,7 +77,7 @@ class LinearizedObject:
         ):
             settle(self, name, require_array, shape)
         settle(self, "coordinates", require_items, str)
-        require_instance("is_excited_by_yaw", self.is_excited_by_yaw, bool)
+        settle(self, "is_excited_by_yaw", require_flag)
         if not np.linalg.eigvalsh(self.m_o22).min(initial=np.inf) > 0:
             raise ParameterError(
                 "m_o22", self.m_o22.tolist(), "a positive definite matrix", "Give every part mass."
