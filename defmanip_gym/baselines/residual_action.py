@@ -15,12 +15,12 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.controller import State
-from defmanip_gym.baselines.residual import corrected
+from defmanip_gym.baselines.residual import corrected, required_periods
 from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
-from defmanip_gym.validation import require_positive, require_whole
+from defmanip_gym.validation import require_positive
 from defmanip_gym.wrappers.nu_max_scaling import (
     NuMaxActionScaling,
     NuMaxVectorActionScaling,
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from defmanip_gym.envs.vector import DeformTransportVectorEnv
 
 Array = NDArray[np.float64]
-
-_MOST_PERIODS = 1000  # in one decision
 
 _ENDINGS = ("final_obs", "final_info", "_final_obs", "_final_info")
 
@@ -80,7 +78,7 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
             raise ParameterError(
                 "autoreset_mode", mode, "AutoresetMode.SAME_STEP", "Make the batch in that mode."
             )
-        decision_periods = require_whole("decision_periods", decision_periods, 1, _MOST_PERIODS)
+        decision_periods = required_periods(decision_periods)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxVectorActionScaling(env, bound))
         self._base, self._decision_periods = base, decision_periods
@@ -192,7 +190,7 @@ class ResidualAction(
         decision_periods: int = 1,
         authority: float = 1.0,
     ) -> None:
-        decision_periods = require_whole("decision_periods", decision_periods, 1, _MOST_PERIODS)
+        decision_periods = required_periods(decision_periods)
         authority = require_positive("authority", authority)
         gymnasium.utils.RecordConstructorArgs.__init__(
             self, certificate=certificate, decision_periods=decision_periods, authority=authority

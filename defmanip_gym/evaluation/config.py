@@ -11,6 +11,7 @@ from defmanip_gym.evaluation.suites import SUITE_NAMES, Suite, suite_named
 from defmanip_gym.validation import (
     MOST_WORKERS,
     require_choice,
+    require_flag,
     require_items,
     require_whole,
     settle,
@@ -59,6 +60,8 @@ class ComparisonConfig:
     def __post_init__(self) -> None:
         settle(self, "suites", require_items, str)
         settle(self, "agents", require_items, Path)
+        settle(self, "allow_pickle", require_flag)
+        settle(self, "fresh", require_flag)
         if self.contestants is not None:
             settle(self, "contestants", require_items, str)
         for name in self.suites:

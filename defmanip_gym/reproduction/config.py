@@ -6,7 +6,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from defmanip_gym.validation import require_number, settle
+from defmanip_gym.validation import require_flag, require_number, settle
 
 # 11 hours of the paper's time; the transport converges before
 _LONGEST_S = 40_000.0
@@ -34,6 +34,7 @@ class ReproductionConfig:
     """Discard what an earlier run left in the output folder."""
 
     def __post_init__(self) -> None:
+        settle(self, "fresh", require_flag)
         settle(self, "max_duration_s", require_number, 1.0, 1e6, "s")
 
     @property

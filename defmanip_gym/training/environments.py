@@ -13,7 +13,7 @@ from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.hyperparameters import built, components
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
-from defmanip_gym.validation import require_between, require_whole
+from defmanip_gym.validation import require_whole
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling, transport_config
 
 _EVALUATION_BATCH = 64
@@ -25,9 +25,7 @@ def make_training_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> V
     Raises:
         ParameterError: wrappers or arguments that cannot be used.
     """
-    count = hyperparameters["n_envs"]
-    require_whole("n_envs", count, 1)
-    require_between("n_envs", count, 0, LARGEST_BATCH)
+    count = require_whole("n_envs", hyperparameters["n_envs"], 1, LARGEST_BATCH)
     venv = VecNormalize(_sb3_env(config, hyperparameters, count), norm_reward=True)
     venv.gamma = float(hyperparameters.get("gamma", 0.99))
     # a seed of its own for every episode generator of every run

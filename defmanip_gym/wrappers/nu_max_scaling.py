@@ -119,7 +119,7 @@ class ActionScaling:
         return np.asarray(self._covers & (swing <= limit))
 
     def scale(
-        self, actions: Array, observation: Array, idle: BoolArray | None = None
+        self, actions: Any, observation: Array, idle: BoolArray | None = None
     ) -> tuple[Array, Array]:
         """Return certified actions (n, 3) and by how much w changed, (n,) m/s².
 
@@ -206,7 +206,7 @@ class NuMaxActionScaling(
         """Step with the action scaled into the certificate."""
         if self._observation is None:
             raise ResetNeeded("Call reset() before the first step().")
-        certified, change = self.scaling.scale(np.expand_dims(action, 0), self._observation[None])
+        certified, change = self.scaling.scale([action], self._observation[None])
         observation, reward, terminated, truncated, info = self.env.step(certified[0])
         self._observation = observation.copy()  # the caller's own from now on
         return observation, float(reward), terminated, truncated, info | self._report(change[0])
