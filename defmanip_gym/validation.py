@@ -227,7 +227,11 @@ def number_array(values: object) -> NDArray[np.float64] | None:
     """Return numbers of any shape as a new array, or None where they are none."""
     try:
         array = np.asarray(values)
-        return np.array(array, dtype=np.float64, order="C") if array.dtype.kind in "biufO" else None
+        if array.dtype.kind not in "biufO":
+            return None
+        if array.dtype == np.float64 and isinstance(values, list | tuple):
+            return array  # which is new, and a step is short
+        return np.array(array, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError):
         return None
 

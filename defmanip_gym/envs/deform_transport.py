@@ -121,6 +121,8 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
     | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
 
+    Parameters may also be mappings of their fields, as the JSON of `env.spec` holds them.
+
     ## Version History
     * v0: initial version.
     """
