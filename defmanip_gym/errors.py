@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+import pickle
+from typing import Any, overload
+
+import gymnasium
+
 
 class DefmanipError(Exception):
-    """Base class: ``except DefmanipError`` catches whatever this package raises on purpose."""
+    """Base class: ``except DefmanipError`` catches whatever this package raises on purpose.
+
+    Copies and pickles are whole, also in another process; of an attribute that cannot be pickled
+    they hold the text.
+    """
+
+    def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
+        attributes = {key: _portable(value, protocol) for key, value in vars(self).items()}
+        # by its text alone, whatever its constructor takes
+        return _rebuilt, (type(self), str(self)), attributes
 
 
 class InvalidValueError(DefmanipError, ValueError):
@@ -17,9 +31,31 @@ class InvalidValueError(DefmanipError, ValueError):
         remedy: what to do about it.
     """
 
-    def __init__(self, name: str, value: object, allowed: str, remedy: str) -> None:
+    name: str
+    value: object
+    allowed: str
+    remedy: str
+
+    @overload
+    def __init__(self, name: InvalidValueError) -> None: ...
+
+    @overload
+    def __init__(self, name: str, value: object, allowed: str, remedy: str) -> None: ...
+
+    def __init__(
+        self,
+        name: str | InvalidValueError,
+        value: object = None,
+        allowed: str = "",
+        remedy: str = "",
+    ) -> None:
+        if isinstance(name, InvalidValueError):  # AsyncVectorEnv raises type(error)(error) again
+            self.name, self.value = name.name, name.value
+            self.allowed, self.remedy = name.allowed, name.remedy
+            super().__init__(str(name))
+            return
         self.name, self.value, self.allowed, self.remedy = name, value, allowed, remedy
-        super().__init__(f"{name} is {value!r}; allowed: {allowed}. {remedy}")
+        super().__init__(f"{name} is {_shown(value)}; allowed: {allowed}. {remedy}")
 
 
 class ParameterError(InvalidValueError):
@@ -32,6 +68,10 @@ class ActionError(InvalidValueError):
 
 class StartError(InvalidValueError):
     """A start state that the robot cannot take, or unknown reset options."""
+
+
+class SeedError(StartError, gymnasium.error.Error):
+    """A seed that is not a whole number from zero; Gymnasium's own error as well."""
 
 
 class ObjectFileError(InvalidValueError):
@@ -64,3 +104,25 @@ class DivergenceError(InvalidValueError):
 
 class RenderingError(DefmanipError, RuntimeError):
     """No image can be made here, typically because the machine has no OpenGL."""
+
+
+def _rebuilt(kind: type[DefmanipError], text: str) -> DefmanipError:
+    error = kind.__new__(kind)
+    error.args = (text,)
+    return error
+
+
+def _portable(value: object, protocol: Any) -> object:
+    """Return ``value`` if another process can have it, else its text."""
+    try:
+        pickle.loads(pickle.dumps(value, protocol))
+    except Exception:  # whatever the value's class raises
+        return _shown(value)
+    return value
+
+
+def _shown(value: object) -> str:
+    try:
+        return repr(value)
+    except Exception:  # of integers with thousands of digits, for one
+        return f"a {type(value).__name__} that cannot be shown"

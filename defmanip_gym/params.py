@@ -1,7 +1,9 @@
 """Physical parameters: frozen, keyword-only, validated when constructed.
 
 Units stand in the names (``_m``, ``_kg``, ``_s``, ``_rad``; dampings in N·m·s/rad, stiffnesses in
-N·m/rad). Every constructor raises :class:`~defmanip_gym.errors.ParameterError`.
+N·m/rad). Every constructor takes NumPy's numbers and arrays as well, keeps Python's own, and raises
+:class:`~defmanip_gym.errors.ParameterError`. The ranges are those of anything that a robot carries:
+beyond them physics and integrals cost too much or overflow.
 """
 
 from __future__ import annotations
@@ -14,11 +16,12 @@ from typing import TYPE_CHECKING
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import (
     require_between,
-    require_instance,
     require_non_negative,
-    require_positive,
+    require_number,
+    require_params,
     require_range,
     require_whole,
+    settle,
 )
 
 if TYPE_CHECKING:  # parameters are plain numbers; only sampling mentions NumPy
@@ -32,25 +35,34 @@ DESIGN_DAMPING = 1.0
 # Beyond this angle the linearization (16) says nothing useful about the beam.
 LARGEST_SIGMA_RAD = math.pi / 3
 
+# (low, high): what bodies, limits and objects may be
+_LENGTHS_M = (0.01, 100.0)
+_RADII_M = (1e-4, 10.0)
+_MASSES_KG = (1e-3, 1e5)
+_INERTIAS_KGM2 = (1e-4, 1e5)
+_FORCES_N = (1e-3, 1e6)
+_DAMPINGS = (0.0, 1e4)
+_STIFFNESSES = (0.0, 1e6)
+_MOST_SEGMENTS = 64
+
 
 def validated_sigma(sigma_rad: float) -> float:
     """Return σ, the admissible deformation of Eq. (9), or raise ParameterError."""
-    require_between(
+    return require_between(
         "sigma_rad",
         sigma_rad,
         0.0,
         LARGEST_SIGMA_RAD,
         remedy="The bounds linearize about hanging at rest; choose a σ below 60 degrees.",
     )
-    return float(sigma_rad)
 
 
-def _require_slender(name: str, radius_m: float, length_m: float) -> None:
-    """Raise ParameterError where no body has the inertias m l²/12, m l²/12, m r²/2."""
-    require_positive(name, radius_m, "m")
-    require_between(
+def _require_slender(name: str, radius_m: object, length_m: float) -> float:
+    """Return a radius for which a body with the inertias m l²/12, m l²/12, m r²/2 exists."""
+    radius = require_number(name, radius_m, *_RADII_M, "m")
+    return require_between(
         name,
-        radius_m,
+        radius,
         0.0,
         length_m / math.sqrt(3),
         remedy="Take a thinner or longer rod, or fewer segments; links are slender rods.",
@@ -66,9 +78,9 @@ class LinkParams:
     radius_m: float = 0.04
 
     def __post_init__(self) -> None:
-        require_positive("length_m", self.length_m, "m")
-        require_positive("mass_kg", self.mass_kg, "kg")
-        _require_slender("radius_m", self.radius_m, self.length_m)
+        settle(self, "length_m", require_number, *_LENGTHS_M, "m")
+        settle(self, "mass_kg", require_number, *_MASSES_KG, "kg")
+        settle(self, "radius_m", _require_slender, self.length_m)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,19 +102,19 @@ class RobotParams:
     elbow_torque_limit_nm: float = 150.0
 
     def __post_init__(self) -> None:
-        require_instance("upper_arm", self.upper_arm, LinkParams)
-        require_instance("forearm", self.forearm, LinkParams)
-        require_positive("base_mass_kg", self.base_mass_kg, "kg")
-        require_positive("base_yaw_inertia_kgm2", self.base_yaw_inertia_kgm2, "kg m²")
-        require_positive("shoulder_height_m", self.shoulder_height_m, "m")
-        require_non_negative("joint_armature_kgm2", self.joint_armature_kgm2, "kg m²")
+        settle(self, "upper_arm", require_params, LinkParams)
+        settle(self, "forearm", require_params, LinkParams)
+        settle(self, "base_mass_kg", require_number, *_MASSES_KG, "kg")
+        settle(self, "base_yaw_inertia_kgm2", require_number, *_INERTIAS_KGM2, "kg m²")
+        settle(self, "shoulder_height_m", require_number, *_LENGTHS_M, "m")
+        settle(self, "joint_armature_kgm2", require_number, 0.0, _INERTIAS_KGM2[1], "kg m²")
         for name in (
             "drive_force_limit_n",
             "steering_torque_limit_nm",
             "shoulder_torque_limit_nm",
             "elbow_torque_limit_nm",
         ):
-            require_positive(name, getattr(self, name))
+            settle(self, name, require_number, *_FORCES_N)
 
     @property
     def force_limits(self) -> tuple[float, float, float, float]:
@@ -134,14 +146,14 @@ class BeamParams:
     radius_m: float = 0.02
 
     def __post_init__(self) -> None:
-        require_positive("mass_kg", self.mass_kg, "kg")
-        require_positive("length_m", self.length_m, "m")
-        require_non_negative("damping", self.damping, "N m s/rad")
-        require_whole("segment_count", self.segment_count, 1)
-        require_non_negative("joint_stiffness", self.joint_stiffness, "N m/rad")
-        require_non_negative("joint_damping", self.joint_damping, "N m s/rad")
-        require_non_negative("root_stiffness", self.root_stiffness, "N m/rad")
-        _require_slender("radius_m", self.radius_m, self.segment_length_m)
+        settle(self, "mass_kg", require_number, *_MASSES_KG, "kg")
+        settle(self, "length_m", require_number, *_LENGTHS_M, "m")
+        settle(self, "damping", require_number, *_DAMPINGS, "N m s/rad")
+        settle(self, "segment_count", require_whole, 1, _MOST_SEGMENTS)
+        settle(self, "joint_stiffness", require_number, *_STIFFNESSES, "N m/rad")
+        settle(self, "joint_damping", require_number, *_DAMPINGS, "N m s/rad")
+        settle(self, "root_stiffness", require_number, *_STIFFNESSES, "N m/rad")
+        settle(self, "radius_m", _require_slender, self.segment_length_m)
 
     @property
     def segment_mass_kg(self) -> float:
@@ -166,11 +178,13 @@ class BeamRanges:
     length_m: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        for name, unit in (("damping", "N m s/rad"), ("mass_kg", "kg"), ("length_m", "m")):
-            ends = getattr(self, name)
-            if ends is not None:
-                require_range(name, ends, may_be_zero=name == "damping", unit=unit)
-                object.__setattr__(self, name, (float(ends[0]), float(ends[1])))
+        for name, ends, unit in (
+            ("damping", _DAMPINGS, "N m s/rad"),
+            ("mass_kg", _MASSES_KG, "kg"),
+            ("length_m", _LENGTHS_M, "m"),
+        ):
+            if getattr(self, name) is not None:
+                settle(self, name, require_range, *ends, unit)
 
     @property
     def is_empty(self) -> bool:
@@ -237,10 +251,10 @@ class DisturbanceParams:
 
     def __post_init__(self) -> None:
         for name in ("force_amplitude_n", "force_bias_n"):
-            require_between(name, getattr(self, name), -1e4, 1e4)
-        require_non_negative("force_frequency_rad_s", self.force_frequency_rad_s, "rad/s")
-        require_non_negative("force_sensor_noise_n", self.force_sensor_noise_n, "N")
-        require_non_negative("swing_sensor_noise_rad", self.swing_sensor_noise_rad, "rad")
+            settle(self, name, require_number, -1e4, 1e4, "N")
+        settle(self, "force_frequency_rad_s", require_non_negative, "rad/s")
+        settle(self, "force_sensor_noise_n", require_non_negative, "N")
+        settle(self, "swing_sensor_noise_rad", require_non_negative, "rad")
 
     @property
     def has_force(self) -> bool:

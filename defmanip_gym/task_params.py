@@ -13,10 +13,14 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import (
     require_between,
     require_finite_sequence,
-    require_instance,
     require_non_negative,
-    require_positive,
+    require_number,
+    require_params,
+    settle,
 )
+
+# Physics steps of one control period; with more, a step would take longer than anybody waits.
+_MOST_SUBSTEPS = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +40,7 @@ class RewardParams:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            require_non_negative(name, getattr(self, name))
+            settle(self, name, require_non_negative)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +54,8 @@ class StartParams:
     spread: tuple[float, ...] = (1.5, 1.5, 0.5, 0.1, 0.1, 0.05)
 
     def __post_init__(self) -> None:
-        require_finite_sequence("center", self.center, 6)
-        require_finite_sequence("spread", self.spread, 6)
+        settle(self, "center", require_finite_sequence, 6)
+        settle(self, "spread", require_finite_sequence, 6)
         if min(self.spread) < 0:
             raise ParameterError("spread", self.spread, "6 numbers >= 0", "Give half-widths.")
 
@@ -86,31 +90,32 @@ class TaskParams:
     reward: RewardParams = field(default_factory=RewardParams)
 
     def __post_init__(self) -> None:
-        require_finite_sequence("goal", self.goal, 6)
-        require_instance("start", self.start, StartParams)
-        require_instance("reward", self.reward, RewardParams)
-        for name, unit in (
-            ("max_acceleration_m_s2", "m/s²"),
-            ("max_speed_m_s", "m/s"),
-            ("position_tolerance_m", "m"),
-            ("speed_tolerance_m_s", "m/s"),
-            ("swing_tolerance_rad", "rad"),
-            ("heading_tolerance_rad", "rad"),
-            ("course_blend_radius_m", "m"),
-            ("arena_radius_m", "m"),
-            ("smallest_reach_m", "m"),
-            ("smallest_grasp_height_m", "m"),
-            ("control_period_s", "s"),
-            ("physics_period_s", "s"),
+        settle(self, "goal", require_finite_sequence, 6)
+        settle(self, "start", require_params, StartParams)
+        settle(self, "reward", require_params, RewardParams)
+        for name, low, high, unit in (
+            ("max_acceleration_m_s2", 1e-3, 1e3, "m/s²"),
+            ("max_speed_m_s", 1e-3, 1e3, "m/s"),
+            ("position_tolerance_m", 1e-6, 1e3, "m"),
+            ("speed_tolerance_m_s", 1e-6, 1e3, "m/s"),
+            ("swing_tolerance_rad", 1e-6, 1e3, "rad"),
+            ("heading_tolerance_rad", 1e-6, 1e3, "rad"),
+            ("course_blend_radius_m", 1e-6, 1e3, "m"),
+            ("arena_radius_m", 1e-3, 1e4, "m"),
+            ("smallest_reach_m", 1e-3, 1e3, "m"),
+            ("smallest_grasp_height_m", 1e-6, 1e3, "m"),
+            ("control_period_s", 1e-5, 10.0, "s"),
+            ("physics_period_s", 1e-5, 1.0, "s"),
         ):
-            require_positive(name, getattr(self, name), unit)
-        require_between("smallest_elbow_bend_rad", self.smallest_elbow_bend_rad, 0.0, math.pi / 2)
+            settle(self, name, require_number, low, high, unit)
+        settle(self, "smallest_elbow_bend_rad", require_between, 0.0, math.pi / 2)
         ratio = self.control_period_s / self.physics_period_s
-        if ratio < 1 or abs(ratio - round(ratio)) > 1e-9:
+        if not 1 <= round(ratio) <= _MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-9:
             raise ParameterError(
                 "control_period_s",
                 self.control_period_s,
-                f"a whole multiple of physics_period_s={self.physics_period_s}",
+                f"a whole multiple of physics_period_s={self.physics_period_s}, at most "
+                f"{_MOST_SUBSTEPS} times as long",
                 "Change one of the two periods.",
             )
 

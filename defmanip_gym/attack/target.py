@@ -12,7 +12,7 @@ from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.rig_model import RigModel, beam_rig
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.zero_dynamics import LinearizedObject, linearize
-from defmanip_gym.validation import require_non_negative
+from defmanip_gym.validation import require_non_negative, settle
 
 FORWARD, LEFT, UP, YAW = range(4)
 
@@ -34,8 +34,8 @@ class PlantFactors:
     stiffness: float = 1.0
 
     def __post_init__(self) -> None:
-        require_non_negative("damping", self.damping)
-        require_non_negative("stiffness", self.stiffness)
+        settle(self, "damping", require_non_negative)
+        settle(self, "stiffness", require_non_negative)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,10 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.controller import Controller, State
-from defmanip_gym.errors import ParameterError
-from defmanip_gym.validation import require_whole
+from defmanip_gym.validation import require_number, require_whole
 
 Array = NDArray[np.float64]
+
+_MOST_PERIODS = 1000
+
+
+def required_periods(decision_periods: object) -> int:
+    """Return for how many control periods a decision is held, or raise ParameterError."""
+    return require_whole("decision_periods", decision_periods, 1, _MOST_PERIODS)
 
 
 def corrected(base: Array, residual: Array, authority: float) -> Array:
@@ -36,11 +42,9 @@ class ResidualController:
     def __init__(
         self, base: Controller, residual: Controller, *, authority: float, decision_periods: int
     ) -> None:
-        if not 0.0 < authority <= 1.0:
-            raise ParameterError("authority", authority, "0 < authority <= 1", "Choose a share.")
-        require_whole("decision_periods", decision_periods, 1)
         self.base, self.residual = base, residual
-        self.authority, self.decision_periods = authority, decision_periods
+        self.authority = require_number("authority", authority, 1e-9, 1.0)
+        self.decision_periods = required_periods(decision_periods)
 
     def predict(
         self,

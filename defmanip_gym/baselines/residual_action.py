@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.controller import State
-from defmanip_gym.baselines.residual import corrected
+from defmanip_gym.baselines.residual import corrected, required_periods
 from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
-from defmanip_gym.validation import require_positive, require_whole
+from defmanip_gym.validation import require_positive
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling, NuMaxVectorActionScaling
 from defmanip_gym.wrappers.transport import transport_config
 
@@ -38,7 +40,7 @@ def residual_authority(
     Raises:
         ParameterError: an authority that is not positive.
     """
-    require_positive("authority", authority)
+    authority = require_positive("authority", authority)
     limit = config.task.max_acceleration_m_s2
     return min(authority * certificate.acceleration_bound / limit, 1.0)
 
@@ -73,7 +75,7 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
             raise ParameterError(
                 "autoreset_mode", mode, "AutoresetMode.SAME_STEP", "Make the batch in that mode."
             )
-        require_whole("decision_periods", decision_periods, 1)
+        decision_periods = required_periods(decision_periods)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxVectorActionScaling(env, bound))
         self._base, self._decision_periods = base, decision_periods
@@ -185,16 +187,25 @@ class ResidualAction(
         decision_periods: int = 1,
         authority: float = 1.0,
     ) -> None:
+        decision_periods = required_periods(decision_periods)
+        authority = require_positive("authority", authority)
         gymnasium.utils.RecordConstructorArgs.__init__(
             self, certificate=certificate, decision_periods=decision_periods, authority=authority
         )
-        require_whole("decision_periods", decision_periods, 1)
         base, bound = _base_and_certificate(env, certificate)
         super().__init__(NuMaxActionScaling(env, bound))
         self._base, self._decision_periods = base, decision_periods
         self._authority = residual_authority(bound, transport_config(env), authority)
         self._state: State | None = None
         self._action: Array | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+        """How to make it again; the certificate's wrapper comes with it."""
+        spec = copy.deepcopy(self.env.env.spec)  # type: ignore[attr-defined]
+        if spec is not None:
+            spec.additional_wrappers += (self.wrapper_spec(**self._saved_kwargs),)
+        return spec
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -26,7 +26,14 @@ from defmanip_gym.theory.object_model import HangingBeam
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.theory.stability import SampledLoop
 from defmanip_gym.theory.velocity_field import LiteralField, NormalizedField, VelocityField
-from defmanip_gym.validation import require_choice, require_positive
+from defmanip_gym.validation import (
+    require_choice,
+    require_flag,
+    require_number,
+    require_params,
+    require_positive,
+    settle,
+)
 
 Array = NDArray[np.float64]
 FieldKind = Literal["normalized", "literal"]
@@ -75,7 +82,10 @@ class TannerParams:
             "bound_share",
             "deceleration_share",
         ):
-            require_positive(name, getattr(self, name))
+            settle(self, name, require_positive)
+        settle(self, "feedforward", require_flag)
+        settle(self, "gains", require_params, ForceLoopGains)
+        settle(self, "force_law_damping", require_number, -1e4, 1e4, "N m s/rad")
 
 
 class TannerController:

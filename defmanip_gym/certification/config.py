@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
-from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams, validated_sigma
 from defmanip_gym.theory.conditions import CertificateConditions, ParameterIntervals
 from defmanip_gym.theory.elastic_beam import elastic_beam
+from defmanip_gym.validation import require_flag, require_number, settle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +84,12 @@ class CertifyConfig:
 
     def __post_init__(self) -> None:
         validated_sigma(self.sigma)
-        if self.longest_attack_s < 1.0 or not math.isfinite(self.longest_attack_s):
-            raise ParameterError(
-                "longest_attack_s", self.longest_attack_s, "at least 1 s", "Ask for more."
-            )
+        settle(self, "transport", require_flag)
+        settle(self, "attack", require_flag)
+        settle(self, "longest_attack_s", require_number, 1.0, 3600.0, "s")
+        _ = self.intervals, self.conditions  # checks the rest
+        if self.mjcf is None:
+            _ = self.beam
 
     @property
     def beam(self) -> BeamParams:

@@ -18,7 +18,7 @@ from defmanip_gym.params import (
 )
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.validation import require_choice, require_instance
+from defmanip_gym.validation import require_choice, require_params, settle
 
 ControlMode = Literal["task", "force"]
 ConstraintMode = Literal["terminate", "penalty", "cost"]
@@ -28,10 +28,11 @@ ConstraintMode = Literal["terminate", "penalty", "cost"]
 class TransportConfig:
     """Arguments of the environment; see its documentation.
 
-    ``robot`` and ``beam`` are true, the beam but for what ``beam_ranges`` vary; ``nominal_robot``
-    and ``nominal_beam`` are what the built-in feedback linearization believes. By default it
-    believes the truth, except that it counts on no damping at the root: overestimated damping
-    destabilizes the swing.
+    Parameters may also be mappings of their fields, as the JSON of a Gymnasium specification holds
+    them. ``robot`` and ``beam`` are true, the beam but for what ``beam_ranges`` vary;
+    ``nominal_robot`` and ``nominal_beam`` are what the built-in feedback linearization believes. By
+    default it believes the truth, except that it counts on no damping at the root: overestimated
+    damping destabilizes the swing.
     """
 
     control_mode: ControlMode = "task"
@@ -56,10 +57,10 @@ class TransportConfig:
             ("disturbance", DisturbanceParams, False),
         ):
             if not (optional and getattr(self, name) is None):
-                require_instance(name, getattr(self, name), kind)
+                settle(self, name, require_params, kind)
         require_choice("control_mode", self.control_mode, get_args(ControlMode))
         require_choice("constraint_mode", self.constraint_mode, get_args(ConstraintMode))
-        validated_sigma(self.sigma_rad)
+        object.__setattr__(self, "sigma_rad", validated_sigma(self.sigma_rad))
         if self.task.start.largest_swing_rad > self.sigma_rad:
             raise ParameterError(
                 "task.start",

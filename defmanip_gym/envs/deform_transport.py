@@ -15,7 +15,7 @@ from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.validation import require_choice
+from defmanip_gym.validation import require_choice, require_seed
 
 Array = NDArray[np.float64]
 
@@ -121,6 +121,8 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
     | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
 
+    Parameters may also be mappings of their fields, as the JSON of `env.spec` holds them.
+
     ## Version History
     * v0: initial version.
     """
@@ -180,7 +182,13 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Start an episode; see "Starting State" for ``options``."""
+        """Start an episode; see "Starting State" for ``options``.
+
+        Raises:
+            StartError: a start that cannot be taken.
+            SeedError: a seed that is not a whole number >= 0.
+        """
+        seed = require_seed(seed)
         observation, _ = self.engine.reset(seeds=[seed], options=options)
         super().reset(seed=seed)
         if self.render_mode == "human":

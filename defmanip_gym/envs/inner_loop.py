@@ -19,6 +19,7 @@ from defmanip_gym.theory.feedback_linearization import (
 )
 from defmanip_gym.theory.redundancy import RedundancyResolution
 from defmanip_gym.theory.robot_model import ArmLengths, grasp_velocity
+from defmanip_gym.validation import number_array
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -56,9 +57,9 @@ class InnerLoop:
         )
         self._constants = LoopConstants(
             model=linearization.model,
-            max_acceleration_m_s2=float(task.max_acceleration_m_s2),
-            max_speed_m_s=float(task.max_speed_m_s),
-            period_s=float(task.control_period_s),
+            max_acceleration_m_s2=task.max_acceleration_m_s2,
+            max_speed_m_s=task.max_speed_m_s,
+            period_s=task.control_period_s,
             arm=ArmLengths.of(config.robot),
         )
         actions = np.empty(self._shape)
@@ -77,12 +78,11 @@ class InnerLoop:
         Raises:
             ActionError: wrong shape or values that are not finite.
         """
-        try:
-            values = np.array(actions, dtype=np.float64, order="C")
-        except (TypeError, ValueError) as error:
+        values = number_array(actions)
+        if values is None:
             raise ActionError(
                 "action", actions, f"numbers of shape {self._shape}", "Pass a NumPy array."
-            ) from error
+            )
         if values.shape != self._shape:
             raise ActionError(
                 "action shape",

@@ -14,6 +14,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
 from defmanip_gym.task_params import StartParams
+from defmanip_gym.validation import number_array
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
@@ -50,11 +51,8 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
         if start == "paper":
             return np.tile(PAPER_START, (count, 1))
         raise StartError("start", start, _ALLOWED, "Check the spelling.")
-    try:
-        values = np.asarray(start, dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape not in ((6,), (count, 6)) or not np.isfinite(values).all():
+    values = number_array(start)
+    if values is None or values.shape not in ((6,), (count, 6)) or not np.isfinite(values).all():
         raise StartError("start", start, _ALLOWED, "Give six finite numbers in m and rad.")
     return np.broadcast_to(values, (count, 6)).copy()
 

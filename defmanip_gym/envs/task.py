@@ -93,15 +93,15 @@ def task_of(config: TransportConfig) -> Task:
     """Return the constants of an environment's task."""
     task = config.task
     return Task(
-        position_tolerance_m=float(task.position_tolerance_m),
-        speed_tolerance_m_s=float(task.speed_tolerance_m_s),
-        swing_tolerance_rad=float(task.swing_tolerance_rad),
-        heading_tolerance_rad=float(task.heading_tolerance_rad),
-        max_speed_m_s=float(task.max_speed_m_s),
-        sigma_rad=float(config.sigma_rad),
+        position_tolerance_m=task.position_tolerance_m,
+        speed_tolerance_m_s=task.speed_tolerance_m_s,
+        swing_tolerance_rad=task.swing_tolerance_rad,
+        heading_tolerance_rad=task.heading_tolerance_rad,
+        max_speed_m_s=task.max_speed_m_s,
+        sigma_rad=config.sigma_rad,
         violation_ends=config.constraint_mode == "terminate",
         excess_is_penalized=config.constraint_mode == "penalty",
-        weights=RewardWeights(**{k: float(v) for k, v in asdict(task.reward).items()}),
+        weights=RewardWeights(**asdict(task.reward)),
     )
 
 

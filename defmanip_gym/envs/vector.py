@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -21,10 +20,12 @@ from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.validation import require_choice, require_whole
+from defmanip_gym.validation import MOST_WORKERS, require_choice, require_seeds, require_whole
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+
+MOST_ENVS = 65_536
 
 
 class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
@@ -79,9 +80,9 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
-        require_whole("num_envs", num_envs, 1)
-        require_whole("max_episode_steps", max_episode_steps, 1)
-        require_whole("num_threads", num_threads, 0)
+        num_envs = require_whole("num_envs", num_envs, 1, MOST_ENVS)
+        max_episode_steps = require_whole("max_episode_steps", max_episode_steps, 1)
+        num_threads = require_whole("num_threads", num_threads, 0, MOST_WORKERS)
         if render_mode is not None:
             require_choice("render_mode", render_mode, RENDER_MODES[1:])
         self.num_envs, self.render_mode = num_envs, render_mode
@@ -128,7 +129,8 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             options: ``start`` as in the single environment, or (n, 6) of them; ``reset_mask``.
 
         Raises:
-            StartError: bad options or seeds.
+            StartError: bad options.
+            SeedError: bad seeds.
             ResetNeeded: the first reset leaves episodes out.
         """
         if not isinstance(options, Mapping | None):
@@ -136,7 +138,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
         ids = np.arange(self.num_envs) if mask is None else self._masked(mask)
-        seeds = self._seeds(seed)
+        seeds = require_seeds(seed, self.num_envs)
         observation, info = self.engine.reset(ids, seeds=[seeds[i] for i in ids], options=options)
         self._ended[ids] = False
         self._keep_results()
@@ -166,28 +168,6 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         """Keep what running episodes were told: a reset of some tells the others again."""
         if self.autoreset_mode is AutoresetMode.DISABLED:
             self.engine.detach()
-
-    def _seeds(self, seed: Any) -> list[int | None]:
-        """Return a seed, or None, for each episode."""
-        seeds: list[int | None] = [None] * self.num_envs
-        if seed is None:
-            return seeds
-        try:
-            if not np.ndim(seed):
-                first = operator.index(seed)
-                seeds = [first + i for i in range(self.num_envs)]
-            else:
-                seeds = [None if each is None else operator.index(each) for each in seed]
-        except (TypeError, ValueError):
-            seeds = []
-        if len(seeds) != self.num_envs or any(each is not None and each < 0 for each in seeds):
-            raise StartError(
-                "seed",
-                seed,
-                f"a whole number >= 0, or {self.num_envs} of them or None",
-                "Give one per episode.",
-            )
-        return seeds
 
     def _masked(self, mask: Any) -> NDArray[np.intp]:
         try:

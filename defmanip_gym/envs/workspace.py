@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.robot_model import ArmLengths, reach_and_height
 
 Array = NDArray[np.float64]
@@ -28,17 +29,30 @@ class Workspace(NamedTuple):
 
 
 def workspace_of(config: TransportConfig) -> Workspace:
-    """Return the workspace of an environment."""
+    """Return the workspace of an environment.
+
+    Raises:
+        ParameterError: the goal is not in it.
+    """
     task = config.task
-    return Workspace(
+    space = Workspace(
         arm=ArmLengths.of(config.robot),
-        center_x_m=float(task.goal[0]),
-        center_y_m=float(task.goal[1]),
-        arena_radius_m=float(task.arena_radius_m),
-        smallest_elbow_bend_rad=float(task.smallest_elbow_bend_rad),
-        smallest_reach_m=float(task.smallest_reach_m),
-        smallest_grasp_height_m=float(task.smallest_grasp_height_m),
+        center_x_m=task.goal[0],
+        center_y_m=task.goal[1],
+        arena_radius_m=task.arena_radius_m,
+        smallest_elbow_bend_rad=task.smallest_elbow_bend_rad,
+        smallest_reach_m=task.smallest_reach_m,
+        smallest_grasp_height_m=task.smallest_grasp_height_m,
     )
+    goal = np.array(task.goal)
+    if not in_workspace(goal[:3], goal[3], goal[3] + goal[4], space):
+        raise ParameterError(
+            "task.goal",
+            task.goal,
+            "a pose with the elbow bent (-π < q2 < 0), the grasp in front and above the floor",
+            "Choose one that the robot can take, or another robot.",
+        )
+    return space
 
 
 @compilable

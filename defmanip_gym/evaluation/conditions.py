@@ -8,10 +8,12 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams, DisturbanceParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.validation import require_instance, require_non_negative, require_positive
+from defmanip_gym.validation import require_number, require_params, require_positive, settle
 
 # What every controller, the inner loop and the certificates believe to carry.
 NOMINAL_BEAM = BeamParams()
+
+_LONGEST_DELAY_S = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +41,9 @@ class Condition:
 
     def __post_init__(self) -> None:
         for name in ("damping_factor", "mass_factor", "length_factor"):
-            require_positive(name, getattr(self, name))
-        require_instance("disturbance", self.disturbance, DisturbanceParams)
-        require_non_negative("actuation_delay_s", self.actuation_delay_s, "s")
+            settle(self, name, require_positive)
+        settle(self, "disturbance", require_params, DisturbanceParams)
+        settle(self, "actuation_delay_s", require_number, 0.0, _LONGEST_DELAY_S, "s")
         period_s = TaskParams().control_period_s
         if abs(self.delay_periods * period_s - self.actuation_delay_s) > 1e-9:
             raise ParameterError(

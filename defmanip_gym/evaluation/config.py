@@ -9,7 +9,14 @@ from typing import Literal
 
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.suites import SUITE_NAMES, Suite, suite_named
-from defmanip_gym.validation import require_choice, require_whole
+from defmanip_gym.validation import (
+    MOST_WORKERS,
+    require_choice,
+    require_flag,
+    require_items,
+    require_whole,
+    settle,
+)
 
 _ALL: Literal["all"] = "all"
 
@@ -55,12 +62,18 @@ class ComparisonConfig:
     """Discard what an earlier run left in the output folder."""
 
     def __post_init__(self) -> None:
+        settle(self, "suites", require_items, str)
+        settle(self, "agents", require_items, Path)
+        settle(self, "allow_pickle", require_flag)
+        settle(self, "fresh", require_flag)
+        if self.contestants is not None:
+            settle(self, "contestants", require_items, str)
         for name in self.suites:
             require_choice("suites", name, (*SUITE_NAMES, _ALL))
         for name in ("episodes", "members"):
             value = getattr(self, name)
             if value != _ALL:
-                require_whole(name, value, 1)
+                settle(self, name, require_whole, 1)
         if self.normalization is not None and not (self.allow_pickle and len(self.agents) == 1):
             raise ParameterError(
                 "normalization",
@@ -69,7 +82,7 @@ class ComparisonConfig:
                 "Compare several by putting the statistics of each beside it.",
             )
         if self.jobs is not None:
-            require_whole("jobs", self.jobs, 1)
+            settle(self, "jobs", require_whole, 1, MOST_WORKERS)
 
     @property
     def chosen_suites(self) -> tuple[Suite, ...]:

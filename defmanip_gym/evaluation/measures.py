@@ -65,7 +65,7 @@ def episode_record(
         duration_s=duration_s,
         start_distance_m=float(course.distance_m[0]),
         final_distance_m=float(course.distance_m[-1]),
-        speed_limit_m_s=float(task.max_speed_m_s),
+        speed_limit_m_s=task.max_speed_m_s,
         peak_grasp_force_n=float(_norm(force).max()),
         force_error_n=_force_error(course, layout, config, nominal_beam),
         energy_j=float(power[1:].sum() * task.control_period_s),

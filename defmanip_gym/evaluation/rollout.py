@@ -84,7 +84,7 @@ def rollout(
     Returns:
         The episodes in the order of the scenarios.
     """
-    require_positive("horizon_s", horizon_s, "s")
+    horizon_s = require_positive("horizon_s", horizon_s, "s")
     steps = max(1, round(horizon_s / config.task.control_period_s))
     transport = _environment(config, len(scenarios), steps, num_threads)
     applied = AppliedActions(transport)

@@ -78,7 +78,7 @@ class Suite:
 
     def first(self, count: int) -> Suite:
         """Return the suite with the first ``count`` scenarios of each condition only."""
-        require_whole("episodes", count, 1)
+        count = require_whole("episodes", count, 1)
         kept = (self.of(condition)[:count] for condition in self.conditions)
         return replace(self, scenarios=tuple(s for scenarios in kept for s in scenarios))
 

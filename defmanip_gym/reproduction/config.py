@@ -6,8 +6,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from defmanip_gym.errors import ParameterError
-from defmanip_gym.validation import require_positive
+from defmanip_gym.validation import require_flag, require_number, settle
 
 # 11 hours of the paper's time; the transport converges before
 _LONGEST_S = 40_000.0
@@ -35,11 +34,8 @@ class ReproductionConfig:
     """Discard what an earlier run left in the output folder."""
 
     def __post_init__(self) -> None:
-        require_positive("max_duration_s", self.max_duration_s, "s")
-        if self.max_duration_s < 1.0:
-            raise ParameterError(
-                "max_duration_s", self.max_duration_s, "at least 1 s", "Ask for more."
-            )
+        settle(self, "fresh", require_flag)
+        settle(self, "max_duration_s", require_number, 1.0, 1e6, "s")
 
     @property
     def command(self) -> str:

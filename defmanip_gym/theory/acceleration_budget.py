@@ -23,8 +23,8 @@ def acceleration_share(nu_max: float, speed_bound: float, mu: float = 0.0) -> fl
     Raises:
         CertificateError: nothing is left.
     """
-    require_non_negative("speed_bound", speed_bound, "m/s")
-    require_non_negative("mu", mu, "m/s²")
+    speed_bound = require_non_negative("speed_bound", speed_bound, "m/s")
+    mu = require_non_negative("mu", mu, "m/s²")
     share = nu_max - speed_bound - mu
     if not share > 0:
         raise CertificateError(
@@ -46,8 +46,8 @@ def semiglobal_gain(share: float, largest_error: float) -> float:
         share: s of Eq. (19), m/s².
         largest_error: bound on ‖ė_z1(0)‖, m/s.
     """
-    require_positive("share", share, "m/s²")
-    require_positive("largest_error", largest_error, "m/s")
+    share = require_positive("share", share, "m/s²")
+    largest_error = require_positive("largest_error", largest_error, "m/s")
     return share / largest_error
 
 
@@ -66,7 +66,7 @@ def largest_field_speed(nu_max: float, mu: float, speed_bound: float, gain: floa
     Raises:
         CertificateError: no field is slow enough for this gain.
     """
-    require_positive("gain", gain, "1/s")
+    gain = require_positive("gain", gain, "1/s")
     speed = acceleration_share(nu_max, speed_bound, mu) / gain - speed_bound
     if not speed > 0:
         raise CertificateError(

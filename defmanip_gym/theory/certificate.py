@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -11,6 +12,7 @@ from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.conditions import CertificateConditions, ParameterIntervals
 from defmanip_gym.theory.limits import nonlinear_limit
 from defmanip_gym.theory.zero_dynamics import LinearizedObject
+from defmanip_gym.validation import require_finite_sequence, require_params, settle
 
 Proof = Literal["nonlinear", "linear", "none"]
 Deformable = BeamParams | LinearizedObject
@@ -46,6 +48,12 @@ class Certificate:
     conditions: CertificateConditions
     intervals: ParameterIntervals
     worst_factors: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        settle(self, "deformable", _require_deformable)
+        settle(self, "conditions", require_params, CertificateConditions)
+        settle(self, "intervals", require_params, ParameterIntervals)
+        settle(self, "worst_factors", require_finite_sequence, 2)
 
     @property
     def coordinate_count(self) -> int:
@@ -129,6 +137,16 @@ class Certificate:
     def is_proven(self) -> bool:
         """Whether a proof, for the linearized object at least, stands behind it."""
         return self.proof != "none"
+
+
+def _require_deformable(name: str, value: object) -> Deformable:
+    """Return a beam or a linearized object, or what the mapping of either's fields makes."""
+    is_linearized = isinstance(value, LinearizedObject) or (
+        isinstance(value, Mapping) and "equilibrium" in value
+    )
+    if is_linearized:
+        return require_params(name, value, LinearizedObject)
+    return require_params(name, value, BeamParams)
 
 
 def _share_a_factor(pairs: _Pairs, low: float, high: float) -> bool:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from defmanip_gym.errors import ParameterError
-from defmanip_gym.validation import require_finite_sequence, require_non_negative
+from defmanip_gym.validation import require_number, require_range, settle
 
 _LARGEST_FACTOR = 1000.0
 _LARGEST_CONDITION = 1000.0
@@ -33,12 +32,7 @@ class CertificateConditions:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            require_non_negative(name, value)
-            if value > _LARGEST_CONDITION:
-                raise ParameterError(
-                    name, value, f"at most {_LARGEST_CONDITION:g}", "Nothing is carried like that."
-                )
+            settle(self, name, require_number, 0.0, _LARGEST_CONDITION)
 
 
 # Room for the transport task: 0.43 m of lifting, one turn of some 70 degrees, sampled starts, and
@@ -65,17 +59,9 @@ class ParameterIntervals:
     stiffness: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
+        # factors on the object's own values, for instance (0.5, 2.0)
         for name in self.__dataclass_fields__:
-            interval = getattr(self, name)
-            require_finite_sequence(name, interval, 2)
-            object.__setattr__(self, name, (float(interval[0]), float(interval[1])))
-            if not 0 <= interval[0] <= interval[1] <= _LARGEST_FACTOR:
-                raise ParameterError(
-                    name,
-                    interval,
-                    f"(low, high) with 0 <= low <= high <= {_LARGEST_FACTOR:g}",
-                    "These are factors on the object's own values, for instance (0.5, 2.0).",
-                )
+            settle(self, name, require_range, 0.0, _LARGEST_FACTOR)
 
     @property
     def middle(self) -> ParameterIntervals:

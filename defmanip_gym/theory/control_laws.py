@@ -9,7 +9,7 @@ import numpy as np
 
 from defmanip_gym.compiled import compiled
 from defmanip_gym.theory.chain import Array
-from defmanip_gym.validation import require_non_negative
+from defmanip_gym.validation import require_non_negative, settle
 
 
 def saturated_tracking(
@@ -34,8 +34,8 @@ class ForceLoopGains:
     k2: float = 1.0
 
     def __post_init__(self) -> None:
-        require_non_negative("k1", self.k1)
-        require_non_negative("k2", self.k2)
+        settle(self, "k1", require_non_negative)
+        settle(self, "k2", require_non_negative)
 
 
 def force_loop(u_o: Array, error: Array, error_integral: Array, gains: ForceLoopGains) -> Array:

@@ -66,11 +66,13 @@ def elastic_beam(
             swing under gravity, which bends it too little to be damped otherwise, with
             ``damping_ratio``.
     """
-    require_positive("length_m", length_m, "m")
-    require_positive("bending_stiffness_n_m2", bending_stiffness_n_m2, "N m²")
-    require_non_negative("damping_ratio", damping_ratio)
+    length_m = require_positive("length_m", length_m, "m")
+    bending_stiffness_n_m2 = require_positive(
+        "bending_stiffness_n_m2", bending_stiffness_n_m2, "N m²"
+    )
+    damping_ratio = require_non_negative("damping_ratio", damping_ratio)
     require_choice("root", root, tuple(FIRST_WAVE_NUMBERS))
-    require_whole("segment_count", segment_count, 1 if root == "clamped" else 2)
+    segment_count = require_whole("segment_count", segment_count, 1 if root == "clamped" else 2)
     mass = _mass(mass_kg, density_kg_m3, length_m, radius_m)
     frequency = first_elastic_frequency(
         length_m=length_m,
@@ -83,7 +85,7 @@ def elastic_beam(
     damping_per_stiffness = 2 * damping_ratio / frequency
     if damping is None:
         damping = 0.0 if root == "clamped" else _swing_damping(length_m, mass, damping_ratio)
-    require_non_negative("damping", damping, "N m s/rad")
+    damping = require_non_negative("damping", damping, "N m s/rad")
     return BeamParams(
         mass_kg=mass,
         length_m=length_m,
@@ -107,11 +109,9 @@ def _mass(
             f"Give exactly one of them; density_kg_m3 is {density_kg_m3!r}.",
         )
     if mass_kg is not None:
-        require_positive("mass_kg", mass_kg, "kg")
-        return mass_kg
-    assert density_kg_m3 is not None
-    require_positive("density_kg_m3", density_kg_m3, "kg/m³")
-    require_positive("radius_m", radius_m, "m")
+        return require_positive("mass_kg", mass_kg, "kg")
+    density_kg_m3 = require_positive("density_kg_m3", density_kg_m3, "kg/m³")
+    radius_m = require_positive("radius_m", radius_m, "m")
     return density_kg_m3 * math.pi * radius_m**2 * length_m
 
 

@@ -100,7 +100,7 @@ def stabilizing_feedback(linear: LinearizedObject, epsilon: float) -> Array:
     Raises:
         ParameterError: ε is not positive, or forward acceleration does not reach every mode.
     """
-    require_positive("epsilon", epsilon)
+    epsilon = require_positive("epsilon", epsilon)
     if not is_controllable(linear.A_u, linear.forward_input[:, None]):
         raise ParameterError(
             "object",
@@ -124,7 +124,7 @@ def largest_epsilon(linear: LinearizedObject, mu: float, extent: Array) -> float
         mu: μ, m/s².
         extent: half-widths of the box, (2N,), above 0.
     """
-    require_positive("mu", mu, "m/s²")
+    mu = require_positive("mu", mu, "m/s²")
     low, high = -12.0, 5.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
@@ -168,7 +168,7 @@ def stabilize(linear: LinearizedObject, sigma_rad: float, mu: float) -> Internal
         CertificateError: its equilibrium alone uses up σ.
     """
     validated_sigma(sigma_rad)
-    require_positive("mu", mu, "m/s²")
+    mu = require_positive("mu", mu, "m/s²")
     budget = sigma_rad - float(np.abs(linear.equilibrium).max())
     if not budget > 0:
         raise CertificateError(

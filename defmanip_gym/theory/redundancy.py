@@ -89,11 +89,12 @@ class RedundancyResolution:
     def __init__(
         self, robot: RobotParams, *, goal_reach_m: float, k: float = 0.5, k3: float = 2.0
     ) -> None:
-        require_positive("goal_reach_m", goal_reach_m, "m")
-        require_positive("k", k, "1/s")
-        require_positive("k3", k3, "1/s")
+        self.rule = ReachRule(
+            require_positive("goal_reach_m", goal_reach_m, "m"),
+            require_positive("k", k, "1/s"),
+            require_positive("k3", k3, "1/s"),
+        )
         self.kinematics = ArmKinematics(robot)
-        self.rule = ReachRule(float(goal_reach_m), float(k), float(k3))
 
     def accelerations(
         self, w: Array, pitch: Array, pitch_rate: Array, base_velocity: Array

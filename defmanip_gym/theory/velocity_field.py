@@ -13,7 +13,7 @@ import numpy as np
 
 from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.theory.chain import Array
-from defmanip_gym.validation import require_positive
+from defmanip_gym.validation import require_positive, settle
 
 _TINY = 1e-12
 
@@ -70,7 +70,7 @@ class LiteralField:
     k: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive("k", self.k)
+        settle(self, "k", require_positive)
 
     def velocity(self, p: Array) -> Array:
         """Return −k ∇φ(p)."""
@@ -92,7 +92,7 @@ class NormalizedField:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            require_positive(name, getattr(self, name))
+            settle(self, name, require_positive)
 
     def velocity(self, p: Array) -> Array:
         """Return the field at p."""

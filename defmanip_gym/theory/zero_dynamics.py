@@ -8,9 +8,20 @@ from functools import cached_property
 import control
 import numpy as np
 
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.object_model import HangingBeam
+from defmanip_gym.validation import require_array, require_flag, require_items, settle
+
+_SQUARE = (
+    "m_o22",
+    "d_o22",
+    "k_o22",
+    "gravity_stiffness",
+    "vertical_stiffness",
+    "centrifugal_stiffness",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +48,9 @@ class LinearizedObject:
         is_excited_by_yaw: whether turning moves the object even at its equilibrium, or a yaw
             acceleration, which nothing bounds, does; then no certificate allows a yaw rate.
         coordinates: names of the internal coordinates.
+
+    Raises:
+        ParameterError: arrays of other shapes, or no object of positive mass.
     """
 
     m_o11: Array
@@ -51,6 +65,23 @@ class LinearizedObject:
     equilibrium: Array
     is_excited_by_yaw: bool
     coordinates: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        n = np.size(self.equilibrium)
+        for name, shape in (
+            ("m_o11", (3, 3)),
+            ("m_o12", (3, n)),
+            ("horizontal_stiffness", (2, n, n)),
+            ("equilibrium", (n,)),
+            *((name, (n, n)) for name in _SQUARE),
+        ):
+            settle(self, name, require_array, shape)
+        settle(self, "coordinates", require_items, str)
+        settle(self, "is_excited_by_yaw", require_flag)
+        if not np.linalg.eigvalsh(self.m_o22).min(initial=np.inf) > 0:
+            raise ParameterError(
+                "m_o22", self.m_o22.tolist(), "a positive definite matrix", "Give every part mass."
+            )
 
     @property
     def count(self) -> int:

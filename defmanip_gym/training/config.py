@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
-from defmanip_gym.validation import require_choice, require_whole
+from defmanip_gym.validation import MOST_WORKERS, require_choice, require_whole, settle
 
 Recipe = Literal["ppo", "sac", "tqc", "residual", "lagrangian"]
 Method = Literal["l1", "phase_plane", "tanner"]
@@ -82,11 +82,11 @@ class TrainConfig:
         if self.certificate is not None:
             require_choice("certificate", self.certificate, get_args(Method))
         if self.total_timesteps is not None:
-            require_whole("total_timesteps", self.total_timesteps, 1)
-        require_whole("seed", self.seed, 0)
-        require_whole("evaluations", self.evaluations, 1)
-        require_whole("evaluation_episodes", self.evaluation_episodes, 1)
-        require_whole("num_threads", self.num_threads, 0)
+            settle(self, "total_timesteps", require_whole, 1)
+        settle(self, "seed", require_whole, 0)
+        settle(self, "evaluations", require_whole, 1)
+        settle(self, "evaluation_episodes", require_whole, 1)
+        settle(self, "num_threads", require_whole, 0, MOST_WORKERS)
         if self.seed >= FIRST_EVALUATION_SEED:
             raise ParameterError(
                 "seed",

@@ -13,7 +13,7 @@ from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.hyperparameters import built, components
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
-from defmanip_gym.validation import require_between, require_whole
+from defmanip_gym.validation import require_whole
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 from defmanip_gym.wrappers.transport import transport_config
 
@@ -26,9 +26,7 @@ def make_training_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> V
     Raises:
         ParameterError: wrappers or arguments that cannot be used, or seeds kept for validation.
     """
-    count = hyperparameters["n_envs"]
-    require_whole("n_envs", count, 1)
-    require_between("n_envs", count, 0, LARGEST_BATCH)
+    count = require_whole("n_envs", hyperparameters["n_envs"], 1, LARGEST_BATCH)
     if config.seed + count > VALIDATION_SEED:
         raise ParameterError(
             "seed",

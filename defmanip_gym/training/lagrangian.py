@@ -41,10 +41,10 @@ class LagrangianPenalty(BaseCallback):
         learning_rate: float = 0.01,
         largest_multiplier: float = 10.0,
     ) -> None:
-        require_non_negative("cost_limit", cost_limit)
-        require_non_negative("multiplier", multiplier)
-        require_positive("learning_rate", learning_rate)
-        require_positive("largest_multiplier", largest_multiplier)
+        cost_limit = require_non_negative("cost_limit", cost_limit)
+        multiplier = require_non_negative("multiplier", multiplier)
+        learning_rate = require_positive("learning_rate", learning_rate)
+        largest_multiplier = require_positive("largest_multiplier", largest_multiplier)
         super().__init__()
         self.cost_limit, self.multiplier = cost_limit, multiplier
         self.learning_rate, self.largest_multiplier = learning_rate, largest_multiplier

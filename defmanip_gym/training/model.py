@@ -53,7 +53,7 @@ def build_model(
     if noise is not None:
         require_choice("noise_type", noise, ("normal",))
         deviation: Any = hyperparameters.get("noise_std")
-        require_non_negative("noise_std", deviation)
+        deviation = require_non_negative("noise_std", deviation)
         size = venv.action_space.shape[0]  # type: ignore[index]
         normal = NormalActionNoise(np.zeros(size), np.full(size, deviation))
         arguments["action_noise"] = VectorizedActionNoise(normal, venv.num_envs)
@@ -104,5 +104,5 @@ def _schedule(rate: Any) -> float | LinearSchedule:
         raise ParameterError(
             "learning_rate", rate, "a number > 0, or lin_ and a number", "See the package's files."
         ) from error
-    require_positive("learning_rate", start)
+    start = require_positive("learning_rate", start)
     return LinearSchedule(start, 0.0, 1.0) if falls else start

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.training.config import Recipe, TrainConfig
-from defmanip_gym.validation import require_choice, require_whole
+from defmanip_gym.validation import require_choice, require_whole, settle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,9 +53,10 @@ class TuneConfig:
 
     def __post_init__(self) -> None:
         require_choice("env", self.env, ENV_IDS)
-        require_whole("trials", self.trials, 1)
-        require_whole("timesteps", self.timesteps, 1)
-        _ = self.training  # checks the rest
+        settle(self, "trials", require_whole, 1)
+        settle(self, "timesteps", require_whole, 1)
+        for name in ("evaluations", "evaluation_episodes", "seed", "num_threads"):
+            object.__setattr__(self, name, getattr(self.training, name))  # which checks the rest
 
     @property
     def training(self) -> TrainConfig:

@@ -17,6 +17,8 @@ from defmanip_gym.wrappers.transport import finite_actions
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+_MOST_PERIODS = 1000
+
 
 class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
     """Holds each action of a batch back for some control periods; until then actions are zero.
@@ -33,7 +35,7 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
     """
 
     def __init__(self, env: gymnasium.vector.VectorEnv[Any, Any, Any], periods: int) -> None:
-        require_whole("periods", periods, 0)
+        periods = require_whole("periods", periods, 0, _MOST_PERIODS)
         super().__init__(env)
         self.periods = periods
         shape = env.action_space.shape or (env.num_envs,)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.theory.certificates import Certificate
+from defmanip_gym.validation import require_params
 from defmanip_gym.wrappers.applicability import Applicability, require_fit
 from defmanip_gym.wrappers.certified_motion import CertifiedMotion, GraspMotion
 from defmanip_gym.wrappers.transport import finite_actions
@@ -37,6 +40,7 @@ class ActionScaling:
         certificate: Certificate,
         action_changers: tuple[str, ...] = (),
     ) -> None:
+        certificate = require_params("certificate", certificate, Certificate)
         require_fit(config, certificate)
         self._config, self._certificate = config, certificate
         self._layout = ObservationLayout(config.beam.segment_count)
@@ -70,7 +74,7 @@ class ActionScaling:
         self._applicability.begin(self._layout.part(observation, "swing"), motion, started)
 
     def scale(
-        self, actions: Array, observation: Array, idle: BoolArray | None = None
+        self, actions: Any, observation: Array, idle: BoolArray | None = None
     ) -> tuple[Array, Array]:
         """Return certified actions (n, 3) and by how much w changed, (n,) m/s².
 

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from defmanip_gym.theory.certificates import Certificate
+from defmanip_gym.validation import plain
 from defmanip_gym.wrappers.action_scaling import ROUNDING_M_S2, ActionScaling
 from defmanip_gym.wrappers.transport import action_changers, transport_config
 
@@ -31,14 +32,15 @@ class NuMaxActionScaling(
 
     Args:
         env: a DeformTransport environment in task mode.
-        certificate: the bounds to enforce.
+        certificate: the bounds to enforce; or a mapping of its fields, as the JSON of a
+            specification holds it.
 
     Raises:
         CertificateError: the certificate does not fit the environment.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], certificate: Certificate) -> None:
-        gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=certificate)
+        gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=plain(certificate))
         super().__init__(env)
         self.scaling = ActionScaling(transport_config(env), certificate, action_changers(env))
         self._observation: Array | None = None
@@ -56,7 +58,7 @@ class NuMaxActionScaling(
         """Step with the action scaled into the certificate."""
         if self._observation is None:
             raise ResetNeeded("Call reset() before the first step().")
-        certified, change = self.scaling.scale(np.expand_dims(action, 0), self._observation[None])
+        certified, change = self.scaling.scale([action], self._observation[None])
         observation, reward, terminated, truncated, info = self.env.step(certified[0])
         self._observation = observation.copy()  # the caller's own from now on
         self.scaling.conclude(observation[None])
@@ -76,7 +78,8 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
 
     Args:
         env: a batched DeformTransport environment in task mode.
-        certificate: the bounds to enforce.
+        certificate: the bounds to enforce; or a mapping of its fields, as the JSON of a
+            specification holds it.
 
     Raises:
         CertificateError: the certificate does not fit the environment.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ActionError, CertificateError
+from defmanip_gym.validation import number_array
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -99,12 +100,9 @@ def finite_actions(actions: Any, awake: BoolArray, shape: tuple[int, ...] = (3,)
         ActionError: actions that are not finite or of another shape.
     """
     shape = (len(awake), *shape)
-    try:
-        values = np.array(actions, dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape == shape:
+    values = number_array(actions)
+    if values is not None and values.shape == shape:
         values[~awake] = 0.0
-    if values.shape != shape or not np.isfinite(values).all():
+    if values is None or values.shape != shape or not np.isfinite(values).all():
         raise ActionError("action", actions, f"finite numbers of shape {shape}", "Check them.")
     return values

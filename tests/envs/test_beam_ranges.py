@@ -88,4 +88,4 @@ def test_ranges_that_make_no_beam_are_refused():
     with pytest.raises(ParameterError, match="length_m"):
         gymnasium.make(ENV_ID, beam_ranges=BeamRanges(length_m=(0.01, 0.6)))
     with pytest.raises(ParameterError, match="beam_ranges"):
-        gymnasium.make(ENV_ID, beam_ranges={"damping": (0.1, 1.0)})
+        gymnasium.make(ENV_ID, beam_ranges={"dampings": (0.1, 1.0)})

@@ -217,7 +217,7 @@ def test_bad_actions_are_refused_by_name(action):
         ("sigma_rad", float("nan")),
         ("nominal_beam", BeamParams(segment_count=2)),
         ("beam", "steel"),
-        ("task", {}),
+        ("task", {"gaol": (0.0,) * 6}),
         ("disturbance", 0.05),
         ("nominal_robot", 1),
     ],

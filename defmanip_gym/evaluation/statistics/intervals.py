@@ -62,9 +62,9 @@ def wilson_interval(successes: int, trials: int, confidence: float = CONFIDENCE)
     Raises:
         ParameterError: no trials, or successes not among them.
     """
-    require_whole("trials", trials, 1)
-    require_whole("successes", successes, 0)
-    require_between("confidence", confidence, 0.0, 1.0)
+    trials = require_whole("trials", trials, 1)
+    successes = require_whole("successes", successes, 0)
+    confidence = require_between("confidence", confidence, 0.0, 1.0)
     if successes > trials:
         raise ParameterError("successes", successes, f"at most {trials} trials", "Count again.")
     interval = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
@@ -87,7 +87,7 @@ def welch_interval(
     B. L. Welch, "The generalization of Student's problem when several different population
     variances are involved", Biometrika 34 (1947). Without components there is no interval.
     """
-    require_between("confidence", confidence, 0.0, 1.0)
+    confidence = require_between("confidence", confidence, 0.0, 1.0)
     if not components:
         return None
     variance = sum(part.variance for part in components)
@@ -104,7 +104,7 @@ def percentile_interval(draws: Array, confidence: float = CONFIDENCE) -> Interva
     Resamples without a value (NaN), as of times where nobody arrived, do not count; without any
     value there is no interval.
     """
-    require_between("confidence", confidence, 0.0, 1.0)
+    confidence = require_between("confidence", confidence, 0.0, 1.0)
     finite = draws[np.isfinite(draws)]
     if not finite.size:
         return None

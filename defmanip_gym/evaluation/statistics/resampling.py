@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.statistics.aggregates import Aggregate
-from defmanip_gym.validation import require_whole
+from defmanip_gym.validation import require_whole, settle
 
 Array = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -38,7 +38,7 @@ def stratified_draws(
     Raises:
         ParameterError: a single run, which has no scatter.
     """
-    require_whole("resamples", resamples, 1)
+    resamples = require_whole("resamples", resamples, 1)
     runs, tasks = values.shape
     if runs < 2:
         raise ParameterError("runs", runs, "two or more", "One run has no scatter: train another.")
@@ -86,7 +86,7 @@ class CrossedBootstrap:
     seed: int = _SEED
 
     def __post_init__(self) -> None:
-        require_whole("resamples", self.resamples, 1)
+        settle(self, "resamples", require_whole, 1)
         require_whole("scenarios", len(self.strata), 1)
 
     @cached_property
