@@ -82,7 +82,8 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         deformable = config.beam
         target = beam_target(deformable)
     conditions = TRANSPORT_CONDITIONS if config.transport else config.conditions
-    certificates, refusals = {}, {}
+    certificates: dict[str, Certificate] = {}
+    refusals: dict[str, CertificateError] = {}
     for method in CERTIFICATE_METHODS:
         if method == PHASE_PLANE and target.linear.count > 1:
             continue
@@ -96,16 +97,15 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
                 intervals=config.intervals,
             )
         except CertificateError as error:
-            refusals[method] = str(error)
-            last_refusal = error
+            refusals[method] = error
     if not any(certificate.is_proven for certificate in certificates.values()):
-        raise last_refusal
+        raise refusals["l1"]  # the method that leaves most room to every object
     tell("nonlinear limit")
     ladder = Ladder(
         linear=target.linear,
         conditions=conditions,
         certificates=certificates,
-        refusals=refusals,
+        refusals={method: str(error) for method, error in refusals.items()},
         resonant_limit=_resonant_limit(target.linear, config.sigma),
         attack=None,
         target=target,

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import Ladder
-from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, Certificate
+from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, PHASE_PLANE, Certificate
 from defmanip_gym.theory.conditions import EXACT_PARAMETERS
 from defmanip_gym.version import __version__
 
@@ -33,7 +33,7 @@ def ladder_table(ladder: Ladder) -> Table:
     for method in CERTIFICATE_METHODS:
         certificate = ladder.certificates.get(method)
         if certificate is None and method in ladder.refusals:
-            table.add_row(method, *[_NONE] * 4, "no room left")
+            table.add_row(method, *[_NONE] * 4, _refusal(ladder, method))
         if certificate is None:
             continue
         table.add_row(
@@ -121,10 +121,19 @@ def _attack_numbers(ladder: Ladder) -> dict[str, Any] | None:
     }
 
 
+def _refusal(ladder: Ladder, method: str) -> str:
+    if method == PHASE_PLANE and ladder.tightest.nonlinear_limit is None:
+        return "needs a beam"
+    return "no room left"
+
+
 def _nonlinear_remark(certificate: Certificate) -> str:
     limit = certificate.nonlinear_limit
     if limit is None:
-        return "Of this object only the linearization is known: nothing is proven beyond it."
+        return (
+            "Of an object from a file only the linearization is known: nothing is proven beyond "
+            "it, and phase_plane has no curve to follow."
+        )
     if limit == 0:
         return "Nothing is proven for the nonlinear object under these conditions."
     exact = " (exact)" if certificate.coordinate_count == 1 else ""

@@ -41,6 +41,23 @@ def test_a_model_file_is_certified_by_name_of_its_grasp_site():
     assert {certificate.proof for certificate in hose.certificates.values()} == {"none", "linear"}
 
 
+ONE_HINGE = """<mujoco><worldbody><body><site name="grasp"/><geom size=".03" mass=".5"/><body>
+    <joint axis="0 -1 0" damping=".1"/><geom size=".05" pos="0 0 -.3" mass="1"/></body></body>
+    </worldbody></mujoco>"""
+
+
+def test_of_a_file_with_one_hinge_it_says_why_phase_plane_does_not_serve(tmp_path, capsys):
+    path = tmp_path / "pendulum.xml"
+    path.write_text(ONE_HINGE)
+    one = run_certify(CertifyConfig(mjcf=path, attack=False, output=tmp_path))
+    written = json.loads((one / "certificates.json").read_text())
+    assert "only the linearization is known" in written["refusals"]["phase_plane"]
+    printed = capsys.readouterr().out
+    assert "needs a beam" in printed and "no room left" not in printed
+    with pytest.raises(CertificateError, match="ask for less"):
+        ladder(mjcf=path, attack=False, initial_swing=0.6)
+
+
 def test_an_elastic_beam_is_described_by_its_bending_stiffness():
     beam = CertifyConfig(bending_stiffness=0.4, segments=4, length=1.2, mass=0.5).beam
     assert beam.segment_count == 4
