@@ -12,6 +12,8 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import Certificate
 
+_MOST_LOWERINGS = 5
+
 
 def attack_certificate(
     certificate: Certificate,
@@ -52,6 +54,31 @@ def attack_certificate(
         iterations=iterations,
         num_threads=num_threads,
     )
+
+
+def withstanding(
+    certificate: Certificate, broken: AttackResult, *, target: Target, longest_s: float = 60.0
+) -> Certificate | None:
+    """Return a broken certificate, lowered until an attack of its own does not break it any more.
+
+    Args:
+        certificate: the certificate that was broken.
+        broken: by what.
+        target: its object on the rig.
+        longest_s: longest attack.
+
+    Returns:
+        The lowered certificate; None where attacks broke every one that was tried.
+    """
+    result = broken
+    for _ in range(_MOST_LOWERINGS):
+        if result.withstood_bound <= 0:
+            break
+        certificate = certificate.lowered(result.withstood_bound)
+        result = attack_certificate(certificate, target=target, longest_s=longest_s)
+        if not result.is_broken:
+            return certificate
+    return None
 
 
 def admissible(certificate: Certificate, target: Target) -> InputLimits:

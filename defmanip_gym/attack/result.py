@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from defmanip_gym.attack.crossing import ACCURACY
 from defmanip_gym.attack.target import InputLimits, PlantFactors
 from defmanip_gym.theory.chain import Array
 
@@ -44,7 +45,16 @@ class AttackResult:
     @property
     def is_broken(self) -> bool:
         """Whether an input within the certificate deformed the object beyond σ."""
-        return self.peak_at_bound > self.sigma
+        # smaller inputs are within it, too, and may do what larger ones do not
+        return self.peak_at_bound > self.sigma or self.violating_bound <= self.certified_bound
+
+    @property
+    def withstood_bound(self) -> float:
+        """Largest bound, m/s² and no larger than the certified one, that no attack found broke."""
+        if not self.is_broken:
+            return self.certified_bound
+        below = self.violating_bound - ACCURACY * self.limits.forward_m_s2
+        return min(below, (1 - ACCURACY) * self.certified_bound)
 
     @property
     def tightness(self) -> float:

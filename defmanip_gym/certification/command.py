@@ -18,7 +18,7 @@ from defmanip_gym.files import write_atomically
 def run_certify(config: CertifyConfig) -> Path:
     """Print the ladder for an object, write plot and numbers, return their folder.
 
-    Ctrl-C ends it with 130; there is nothing to keep.
+    Ctrl-C ends it with 130, there is nothing to keep; a broken certificate with 1, all written.
 
     Raises:
         CertificateError: no method gives a certificate under these conditions.
@@ -44,4 +44,6 @@ def run_certify(config: CertifyConfig) -> Path:
             "output", str(config.output), "a folder that can be written", f"{error}."
         ) from error
     console.print(f"Plot and numbers: {config.output.resolve()}", soft_wrap=True, highlight=False)
+    if ladder.attack is not None and ladder.attack.is_broken:
+        raise SystemExit(1)
     return config.output

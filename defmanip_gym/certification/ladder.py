@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from defmanip_gym.attack.certificate import attack_certificate
+from defmanip_gym.attack.certificate import attack_certificate, withstanding
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.attack.target import Target, beam_target, mjcf_target
 from defmanip_gym.certification.config import CertifyConfig
@@ -38,6 +38,8 @@ class Ladder:
         refusals: by method, why there is none.
         resonant_limit: amplitude of the forward sinusoid that uses up σ of the linear object, m/s².
         attack: on the tightest certificate, if asked for.
+        withstanding: that certificate, lowered until attacks did not break it any more; None where
+            it was not broken or is broken however low.
         target: the object on its rig, as attacked.
     """
 
@@ -47,6 +49,7 @@ class Ladder:
     refusals: dict[str, str]
     resonant_limit: float
     attack: AttackResult | None
+    withstanding: Certificate | None
     target: Target
 
     @property
@@ -54,6 +57,14 @@ class Ladder:
         """The certificate with the largest bound that is one."""
         proven = (c for c in self.certificates.values() if c.is_proven)
         return max(proven, key=lambda certificate: certificate.acceleration_bound)
+
+    def is_broken(self, certificate: Certificate) -> bool:
+        """Whether the attack's input is within this certificate and exceeds σ."""
+        if self.attack is None or not certificate.is_proven:
+            return False
+        if certificate is self.tightest:
+            return self.attack.is_broken
+        return self.attack.violating_bound <= certificate.acceleration_bound
 
     def tightness(self, certificate: Certificate) -> float | None:
         """Return its bound over the smallest violating one; ``None`` without an attack."""
@@ -82,7 +93,8 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         deformable = config.beam
         target = beam_target(deformable)
     conditions = TRANSPORT_CONDITIONS if config.transport else config.conditions
-    certificates, refusals = {}, {}
+    certificates: dict[str, Certificate] = {}
+    refusals: dict[str, CertificateError] = {}
     for method in CERTIFICATE_METHODS:
         if method == PHASE_PLANE and target.linear.count > 1:
             continue
@@ -96,25 +108,30 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
                 intervals=config.intervals,
             )
         except CertificateError as error:
-            refusals[method] = str(error)
-            last_refusal = error
+            refusals[method] = error
     if not any(certificate.is_proven for certificate in certificates.values()):
-        raise last_refusal
+        raise refusals["l1"]  # the method that leaves most room to every object
     tell("nonlinear limit")
     ladder = Ladder(
         linear=target.linear,
         conditions=conditions,
         certificates=certificates,
-        refusals=refusals,
+        refusals={method: str(error) for method, error in refusals.items()},
         resonant_limit=_resonant_limit(target.linear, config.sigma),
         attack=None,
+        withstanding=None,
         target=target,
     )
     if not config.attack:
         return ladder
     tell("attack on the plant")
-    attack = attack_certificate(ladder.tightest, target=target, longest_s=config.longest_attack_s)
-    return replace(ladder, attack=attack)
+    tightest, longest_s = ladder.tightest, config.longest_attack_s
+    attack = attack_certificate(tightest, target=target, longest_s=longest_s)
+    lowered = None
+    if attack.is_broken:
+        tell("attack on smaller bounds")
+        lowered = withstanding(tightest, attack, target=target, longest_s=longest_s)
+    return replace(ladder, attack=attack, withstanding=lowered)
 
 
 def _resonant_limit(linear: LinearizedObject, sigma: float) -> float:

@@ -40,7 +40,9 @@ def _draw_bounds(axes: Axes, ladder: Ladder) -> None:
     for row, method in enumerate(methods):
         certificate = ladder.certificates[method]
         bound = certificate.acceleration_bound
-        axes.plot([bound], [row], "o", markersize=9, color=_COLOURS[certificate.proof])
+        is_broken = ladder.is_broken(certificate)
+        marker, colour = ("X", _RED) if is_broken else ("o", _COLOURS[certificate.proof])
+        axes.plot([bound], [row], marker, markersize=9, color=colour)
         axes.annotate(
             f"{bound:.3g}", (bound, row), xytext=(0, 9), textcoords="offset points", ha="center"
         )

@@ -8,9 +8,10 @@ from typing import Any
 from rich import box
 from rich.table import Table
 
+from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import Ladder
-from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, Certificate
+from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, PHASE_PLANE, Certificate
 from defmanip_gym.theory.conditions import EXACT_PARAMETERS
 from defmanip_gym.version import __version__
 
@@ -33,7 +34,7 @@ def ladder_table(ladder: Ladder) -> Table:
     for method in CERTIFICATE_METHODS:
         certificate = ladder.certificates.get(method)
         if certificate is None and method in ladder.refusals:
-            table.add_row(method, *[_NONE] * 4, "no room left")
+            table.add_row(method, *[_NONE] * 4, _refusal(ladder, method))
         if certificate is None:
             continue
         table.add_row(
@@ -41,8 +42,10 @@ def ladder_table(ladder: Ladder) -> Table:
             f"{certificate.nu_max:.3e}",
             _times(certificate, reference),
             f"{certificate.acceleration_bound:.3e}",
-            _share(ladder.tightness(certificate)),
-            certificate.proof,
+            tightness_in_words(ladder.tightness(certificate)),
+            f"[bold red]{certificate.proof}, broken[/]"
+            if ladder.is_broken(certificate)
+            else certificate.proof,
         )
     return table
 
@@ -67,8 +70,25 @@ def remarks(ladder: Ladder) -> list[str]:
             f"{attack.coordinate}, {attack.cpu_seconds:.0f} s)."
         )
         if attack.is_broken:
-            lines.append("BROKEN: do not rely on this certificate, and please report it.")
+            lines.append(_broken_remark(ladder))
     return lines
+
+
+def _broken_remark(ladder: Ladder) -> str:
+    broken, lowered = ladder.tightest, ladder.withstanding
+    words = [
+        f"[bold red]BROKEN[/]: {broken.method} is no certificate for this object. Its bound of "
+        f"{broken.acceleration_bound:.4g} m/s² is proven for {PROOFS[broken.proof]} alone; do not "
+        "rely on it."
+        if broken.proof == "linear"
+        else f"[bold red]BROKEN[/] although proven for {PROOFS[broken.proof]}: do not rely on "
+        "this certificate, and please report it.",
+        "Attacks broke all smaller bounds that were tried."
+        if lowered is None
+        else f"The largest bound that withstood an attack is {lowered.acceleration_bound:.4g} "
+        "m/s², which proves nothing.",
+    ]
+    return " ".join(words)
 
 
 def numbers(config: CertifyConfig, ladder: Ladder) -> dict[str, Any]:
@@ -103,6 +123,7 @@ def _certificate_numbers(ladder: Ladder, certificate: Certificate) -> dict[str, 
         "nonlinear_limit_m_s2": certificate.nonlinear_limit,
         "worst_factors": list(certificate.worst_factors),
         "tightness": ladder.tightness(certificate),
+        "is_broken": ladder.is_broken(certificate),
     }
 
 
@@ -118,13 +139,29 @@ def _attack_numbers(ladder: Ladder) -> dict[str, Any] | None:
         "method": attack.method,
         "coordinate": attack.coordinate,
         "is_broken": attack.is_broken,
+        "withstood_bound_m_s2": _withstood_bound(ladder, attack),
     }
+
+
+def _refusal(ladder: Ladder, method: str) -> str:
+    if method == PHASE_PLANE and ladder.tightest.nonlinear_limit is None:
+        return "needs a beam"
+    return "no room left"
+
+
+def _withstood_bound(ladder: Ladder, attack: AttackResult) -> float | None:
+    if not attack.is_broken:
+        return attack.certified_bound
+    return None if ladder.withstanding is None else ladder.withstanding.acceleration_bound
 
 
 def _nonlinear_remark(certificate: Certificate) -> str:
     limit = certificate.nonlinear_limit
     if limit is None:
-        return "Of this object only the linearization is known: nothing is proven beyond it."
+        return (
+            "Of an object from a file only the linearization is known: nothing is proven beyond "
+            "it, and phase_plane has no curve to follow."
+        )
     if limit == 0:
         return "Nothing is proven for the nonlinear object under these conditions."
     exact = " (exact)" if certificate.coordinate_count == 1 else ""
@@ -170,5 +207,11 @@ def _times(certificate: Certificate, reference: Certificate | None) -> str:
     return f"{certificate.nu_max / reference.nu_max:.3g}"
 
 
-def _share(value: float | None) -> str:
-    return _NONE if value is None else f"{value:.2g}"
+def tightness_in_words(value: float | None) -> str:
+    """Return a tightness as text; one that is not 1 never reads as 1."""
+    if value is None:
+        return _NONE
+    if value < 0.9:
+        return f"{value:.2g}"
+    thousandths = math.ceil(1000 * value) if value > 1 else math.floor(1000 * value)
+    return f"{thousandths / 1000:.3f}"

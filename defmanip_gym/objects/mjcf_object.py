@@ -16,7 +16,8 @@ import numpy as np
 
 from defmanip_gym.errors import ObjectFileError
 from defmanip_gym.params import LARGEST_SIGMA_RAD
-from defmanip_gym.plant.object_file import PREFIX, ObjectFile, read_object_file
+from defmanip_gym.plant.object_copy import HELD_SITE
+from defmanip_gym.plant.object_file import ObjectFile, read_object_file
 from defmanip_gym.plant.rig_model import CARRIAGE_JOINTS, RigModel
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.zero_dynamics import LinearizedObject
@@ -119,11 +120,11 @@ class _InternalForces:
         mujoco.mj_fullM(self.model, self.data, matrix)
         return matrix
 
-    def grasp_motion(self, z2: Array, grasp_site: str) -> Array:
+    def grasp_motion(self, z2: Array) -> Array:
         """Return how the grasp site moves against the carriage with z2, (3, N)."""
         self(z2)
         jacobian = np.zeros((3, self.model.nv))
-        site = self.model.site(PREFIX + grasp_site).id
+        site = self.model.site(HELD_SITE).id
         mujoco.mj_jacSite(self.model, self.data, jacobian, None, site)
         return jacobian[:, _CARRIAGE:]
 
@@ -169,7 +170,7 @@ def _stable(object_file: ObjectFile, forces: _InternalForces, z2: Array) -> Arra
 def _linearized(
     object_file: ObjectFile, forces: _InternalForces, equilibrium: Array
 ) -> LinearizedObject:
-    motion = forces.grasp_motion(equilibrium, object_file.grasp_site)
+    motion = forces.grasp_motion(equilibrium)
     if np.abs(motion).max() > _NEGLIGIBLE:
         moving = np.flatnonzero(np.abs(motion).max(axis=0) > _NEGLIGIBLE)
         raise ObjectFileError(

@@ -1,7 +1,8 @@
 """An object from a MuJoCo model file: read, checked, and hung on the rig.
 
 The rig's carriage takes the place of the gripper: it holds the root body, at the grasp site, with
-the orientation that the file gives it. Forward, left and up are the file's x, y and z axes.
+the orientation that the file gives it. Forward, left and up are the file's x, y and z axes. What
+the object is, is what MuJoCo compiles from the file with the root held still.
 """
 
 from __future__ import annotations
@@ -13,17 +14,20 @@ from typing import TypeVar
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from defmanip_gym.errors import ObjectFileError
 from defmanip_gym.params import GRAVITY_M_S2, LARGEST_SIGMA_RAD
+from defmanip_gym.plant.object_copy import add_object
+from defmanip_gym.plant.object_likeness import differences
 from defmanip_gym.plant.rig_model import heavy_carriage, rig_model
 
+Array = NDArray[np.float64]
 _Made = TypeVar("_Made")
 _SCALAR_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE.value, mujoco.mjtJoint.mjJNT_SLIDE.value)
-PREFIX = "object/"  # keeps the file's names apart from the rig's
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ObjectFile:
     """A checked model file.
 
@@ -31,21 +35,26 @@ class ObjectFile:
         path: of the file.
         grasp_site: name of the site at which it is held.
         coordinates: names of its joints, in MuJoCo's order.
-        mass_kg: of the whole object.
+        held: the object compiled alone, its root held still where the file has it.
+        grasp_m: where the grasp site is in that model's world, (3,).
     """
 
     path: Path
     grasp_site: str
     coordinates: tuple[str, ...]
-    mass_kg: float
+    held: mujoco.MjModel
+    grasp_m: Array
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the whole object."""
+        return float(self.held.body_mass.sum())
 
     def rig_model(self, *, timestep_s: float = 0.002, is_heavy: bool) -> mujoco.MjModel:
         """Compile the rig with the object, on a heavy carriage or on one of no inertia."""
-        # attaching moves the elements out of their MjSpec, so every rig reads the file anew
-        spec, offset = _held(self.path, self.grasp_site)
 
         def attach(rig: mujoco.MjSpec, carriage: mujoco.MjsBody) -> None:
-            rig.attach(spec, prefix=PREFIX, frame=carriage.add_frame(pos=(-offset).tolist()))
+            add_object(rig, carriage, self.held, grasp_site=self.grasp_site, grasp_m=self.grasp_m)
 
         return _compiled(
             self.path,
@@ -65,21 +74,25 @@ def read_object_file(path: str | Path, *, grasp_site: str) -> ObjectFile:
             Eq. (6) with smooth internal dynamics.
     """
     path = Path(path)
-    spec, _ = _held(path, grasp_site)
-    model = _compiled(path, spec.compile)
+    model = _held(path, grasp_site)
     _refuse_what_is_not_smooth(path, model)
     joints = _internal_joints(path, model)
     _refuse_narrow_limits(model, joints)
-    return ObjectFile(
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    object_file = ObjectFile(
         path=path,
         grasp_site=grasp_site,
         coordinates=joints,
-        mass_kg=float(model.body_mass.sum()),
+        held=model,
+        grasp_m=data.site(grasp_site).xpos.copy(),
     )
+    _require_likeness(object_file)
+    return object_file
 
 
-def _held(path: Path, grasp_site: str) -> tuple[mujoco.MjSpec, np.ndarray]:
-    """Return the object without its free joint, and where its grasp site is, world frame."""
+def _held(path: Path, grasp_site: str) -> mujoco.MjModel:
+    """Return the object without its free joint."""
     if not path.is_file():
         raise ObjectFileError("path", str(path), "an MJCF file", "Check the path.")
     spec = _compiled(path, lambda: mujoco.MjSpec.from_file(str(path)))
@@ -88,14 +101,25 @@ def _held(path: Path, grasp_site: str) -> tuple[mujoco.MjSpec, np.ndarray]:
     for joint in list(root.joints):
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             spec.delete(joint)
-    # keyframes count coordinates that the rig does not have; geoms, lights of the world are scenery
-    scenery = (*spec.keys, *spec.worldbody.geoms, *spec.worldbody.lights, *spec.worldbody.cameras)
-    for element in scenery:
-        spec.delete(element)
-    model = _compiled(path, spec.compile)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return spec, data.site(grasp_site).xpos.copy()
+    for key in list(spec.keys):  # they count the free joint's coordinates
+        spec.delete(key)
+    spec.compiler.fusestatic = False  # a root without its free joint would be lost in the world
+    spec.option.enableflags = 0  # nothing sleeps
+    return _compiled(path, spec.compile)
+
+
+def _require_likeness(object_file: ObjectFile) -> None:
+    """Refuse an object that moves differently on the rig than in its own file."""
+    rig = object_file.rig_model(is_heavy=False)
+    found = differences(object_file.held, object_file.grasp_m, rig)
+    if found:
+        raise ObjectFileError(
+            "object",
+            str(object_file.path),
+            "an object made of bodies, joints, springs, dampers and tendons",
+            f"On the rig it has another {' and another '.join(found)} than in the file with its "
+            "root held still; remove what else acts on it there.",
+        )
 
 
 def _compiled(path: Path, make: Callable[[], _Made]) -> _Made:
@@ -171,8 +195,11 @@ def _refuse_what_is_not_smooth(path: Path, model: mujoco.MjModel) -> None:
         "equality constraints": model.neq > 0,
         "actuators": model.nu > 0,
         "plugins": model.nplugin > 0,
+        "flexible meshes (flex)": model.nflex > 0,
+        "springs that yield": model.nplastic > 0,
         "mocap bodies": model.nmocap > 0,
         "tendon limits": model.tendon_limited.any(),
+        "tendons that hold on to the world": _tie_to_the_world(model),
         "tendons with slack (a springlength range)": slack.any(),
         "nonlinear springs or dampers": any(
             getattr(model, name).any()
@@ -183,6 +210,7 @@ def _refuse_what_is_not_smooth(path: Path, model: mujoco.MjModel) -> None:
                 "tendon_dampingpoly",
             )
         ),
+        "joints whose actuators compensate gravity": model.jnt_actgravcomp.any(),
         "a fluid (density or viscosity)": model.opt.density > 0 or model.opt.viscosity > 0,
         "disabled gravity, springs or dampers": model.opt.disableflags & passive,
         f"a gravity other than 0 0 -{GRAVITY_M_S2}": gravity > 1e-6,
@@ -197,12 +225,26 @@ def _refuse_what_is_not_smooth(path: Path, model: mujoco.MjModel) -> None:
         )
 
 
+def _tie_to_the_world(model: mujoco.MjModel) -> bool:
+    """Whether a tendon passes a site or geom that the gripper would leave behind."""
+    wrap = mujoco.mjtWrap
+    bodies = {
+        wrap.mjWRAP_SITE.value: model.site_bodyid,
+        wrap.mjWRAP_SPHERE.value: model.geom_bodyid,
+        wrap.mjWRAP_CYLINDER.value: model.geom_bodyid,
+    }
+    return any(
+        kind in bodies and bodies[kind][target] == 0
+        for kind, target in zip(model.wrap_type.tolist(), model.wrap_objid, strict=True)
+    )
+
+
 def _refuse_narrow_limits(model: mujoco.MjModel, joints: tuple[str, ...]) -> None:
     """Refuse joint limits that a certified motion could reach: the rig has no stops."""
     room = LARGEST_SIGMA_RAD
-    for name, is_limited, (low, high) in zip(
-        joints, model.jnt_limited, model.jnt_range, strict=True
-    ):
+    # a stop begins to push at its margin
+    inner = model.jnt_range + model.jnt_margin[:, None] * [1, -1]
+    for name, is_limited, (low, high) in zip(joints, model.jnt_limited, inner, strict=True):
         if is_limited and not (low <= -room and room <= high):
             raise ObjectFileError(
                 "range",

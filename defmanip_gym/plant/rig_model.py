@@ -102,6 +102,7 @@ def rig_model(
     """
     spec = mujoco.MjSpec()
     spec.modelname = "object_rig"
+    spec.compiler.degree = False
     spec.option.timestep = timestep_s
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_S2]
     # implicit in dampers, symplectic in springs: DISCRETE would add the damping ratio ω h / 2 to

@@ -8,11 +8,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
+from defmanip_gym.errors import CertificateError, ParameterError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.conditions import CertificateConditions, ParameterIntervals
 from defmanip_gym.theory.limits import nonlinear_limit
 from defmanip_gym.theory.zero_dynamics import LinearizedObject
-from defmanip_gym.validation import require_finite_sequence, require_params, settle
+from defmanip_gym.validation import (
+    require_finite_sequence,
+    require_params,
+    require_positive,
+    settle,
+)
 
 Proof = Literal["nonlinear", "linear", "none"]
 Deformable = BeamParams | LinearizedObject
@@ -135,8 +141,52 @@ class Certificate:
 
     @property
     def is_proven(self) -> bool:
-        """Whether a proof, for the linearized object at least, stands behind it."""
+        """Whether a proof, for the linearized object at least, stands behind it.
+
+        ``proof`` says for which: one for the linear object alone has been broken by attacks.
+        """
         return self.proof != "none"
+
+    def lowered(self, acceleration_bound_m_s2: float) -> Certificate:
+        """Return the same promise for a smaller acceleration bound.
+
+        Raises:
+            ParameterError: not a bound > 0 that is at most the certified one.
+        """
+        require_positive("acceleration_bound_m_s2", acceleration_bound_m_s2, "m/s²")
+        if acceleration_bound_m_s2 > self.acceleration_bound:
+            raise ParameterError(
+                "acceleration_bound_m_s2",
+                acceleration_bound_m_s2,
+                f"at most {self.acceleration_bound:.4g}, what is certified",
+                "A certificate says nothing about larger accelerations.",
+            )
+        lost = self.acceleration_bound - acceleration_bound_m_s2
+        return replace(
+            self,
+            nu_max=self.nu_max - lost,
+            acceleration_bound=float(acceleration_bound_m_s2),
+        )
+
+    def proven(self) -> Certificate:
+        """Return the certificate, lowered to what is proven for the nonlinear object.
+
+        Raises:
+            CertificateError: nothing is, under these conditions.
+        """
+        if self.proof == "nonlinear":
+            return self
+        limit = self.nonlinear_limit or 0.0
+        bound = limit - self.conditions.acceleration_error_m_s2
+        if self.proof == "none" or bound <= 0:
+            raise CertificateError(
+                "nonlinear_limit",
+                limit,
+                f"a limit above {self.conditions.acceleration_error_m_s2:g} m/s², the room for "
+                "errors, and a method that is a certificate",
+                "Ask for less in the conditions, or for a smaller σ.",
+            )
+        return self.lowered(bound)
 
 
 def _require_deformable(name: str, value: object) -> Deformable:

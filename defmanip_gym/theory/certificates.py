@@ -155,11 +155,15 @@ def _phase_plane(
     intervals: ParameterIntervals,
 ) -> WorstCase:
     if not _is_one_hinge(deformable):
+        is_beam = isinstance(deformable, BeamParams)
         raise CertificateError(
             "method",
             PHASE_PLANE,
             "an object with one hinge: BeamParams(segment_count=1)",
-            'Use method="l1" for objects with more coordinates and for model files.',
+            'Use method="l1" for objects with more coordinates.'
+            if is_beam
+            else "It follows the nonlinear object, and of this one only the linearization is "
+            'known: use method="l1", or describe the object as a beam.',
         )
     return WorstCase(
         bound=nonlinear_limit(deformable, sigma_rad, conditions, intervals),

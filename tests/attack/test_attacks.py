@@ -1,6 +1,7 @@
 """Adversaries on the MuJoCo plant: no certificate breaks, and none has much room to spare."""
 
 import math
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 
@@ -214,6 +215,31 @@ def test_an_attack_breaks_the_linear_bound_where_the_object_is_not_nearly_linear
         num_threads=1,
     )
     assert result.is_broken and result.tightness > 1.0
+
+
+def test_a_slowly_swinging_upper_segment_breaks_the_linear_bound_but_not_the_proven_one():
+    beam = BeamParams(
+        segment_count=2,
+        mass_kg=7.6,
+        length_m=0.2,
+        damping=2.4,
+        joint_stiffness=0.016,
+        joint_damping=0.004,
+    )
+    certificate = certify(beam, sigma_rad=0.8)
+    target = beam_target(beam, timestep_s=0.004)
+    short = {"target": target, "longest_s": 5.0, "iterations": 1, "num_threads": 1}
+    broken = attack_certificate(certificate, **short)
+    assert broken.is_broken and broken.tightness > 1.0
+    assert broken.withstood_bound < broken.violating_bound < broken.certified_bound
+    proven = certificate.proven()
+    assert proven.proof == "nonlinear" and certificate.proof == "linear"
+    assert not attack_certificate(proven, **short).is_broken
+
+
+def test_an_attack_that_smaller_inputs_win_has_broken_the_certificate_too():
+    _, result = attacked("one hinge, heavy")
+    assert replace(result, violating_bound=0.99 * result.certified_bound).is_broken
 
 
 def test_admissible_inputs_are_those_of_the_certificate():

@@ -5,8 +5,14 @@ import math
 import sys
 from importlib.resources import files
 
+import numpy as np
 import pytest
 
+from defmanip_gym.attack import certificate as certificate_module
+from defmanip_gym.attack.result import AttackResult
+from defmanip_gym.attack.target import InputLimits, PlantFactors
+from defmanip_gym.certification import ladder as ladder_module
+from defmanip_gym.certification import table
 from defmanip_gym.certification.command import run_certify
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import compute_ladder
@@ -39,6 +45,74 @@ def test_a_model_file_is_certified_by_name_of_its_grasp_site():
     assert hose.tightest.method == "l1"
     assert "phase_plane" not in hose.certificates
     assert {certificate.proof for certificate in hose.certificates.values()} == {"none", "linear"}
+
+
+ONE_HINGE = """<mujoco><worldbody><body><site name="grasp"/><geom size=".03" mass=".5"/><body>
+    <joint axis="0 -1 0" damping=".1"/><geom size=".05" pos="0 0 -.3" mass="1"/></body></body>
+    </worldbody></mujoco>"""
+
+
+def test_of_a_file_with_one_hinge_it_says_why_phase_plane_does_not_serve(tmp_path, capsys):
+    path = tmp_path / "pendulum.xml"
+    path.write_text(ONE_HINGE)
+    one = run_certify(CertifyConfig(mjcf=path, attack=False, output=tmp_path))
+    written = json.loads((one / "certificates.json").read_text())
+    assert "only the linearization is known" in written["refusals"]["phase_plane"]
+    printed = capsys.readouterr().out
+    assert "needs a beam" in printed and "no room left" not in printed
+    with pytest.raises(CertificateError, match="ask for less"):
+        ladder(mjcf=path, attack=False, initial_swing=0.6)
+
+
+def attacked_above(limit):
+    """Return an attack that breaks every bound above a limit."""
+
+    def attack(certificate, *, target, longest_s):
+        bound, sigma = certificate.acceleration_bound, certificate.sigma_rad
+        return AttackResult(
+            sigma=sigma,
+            certified_bound=bound,
+            peak_at_bound=sigma * bound / limit,
+            violating_bound=1.004 * limit,
+            method="canned",
+            coordinate=target.linear.coordinates[0],
+            limits=InputLimits(forward_m_s2=1.004 * limit),
+            inputs=np.zeros((10, 4)),
+            start=np.zeros(2 * target.linear.count),
+            timestep_s=target.timestep_s,
+            plant=PlantFactors(),
+            cpu_seconds=0.0,
+        )
+
+    return attack
+
+
+def test_a_certificate_that_an_attack_breaks_is_never_presented_as_one(
+    tmp_path, capsys, monkeypatch
+):
+    config = CertifyConfig(segments=2, output=tmp_path)
+    bound = ladder(segments=2, attack=False).tightest.acceleration_bound
+    attack = attacked_above(0.98 * bound)
+    monkeypatch.setattr(ladder_module, "attack_certificate", attack)
+    monkeypatch.setattr(certificate_module, "attack_certificate", attack)
+    with pytest.raises(SystemExit) as ended:
+        run_certify(config)
+    assert ended.value.code == 1
+    printed = capsys.readouterr().out
+    assert "BROKEN: l1 is no certificate" in printed and "withstood" in printed
+    written = json.loads((tmp_path / "certificates.json").read_text())
+    broken = {method for method, each in written["certificates"].items() if each["is_broken"]}
+    assert broken == {"l1"}
+    assert written["certificates"]["l1"]["tightness"] == pytest.approx(1 / (0.98 * 1.004))
+    assert 0.97 * bound < written["attack"]["withstood_bound_m_s2"] <= 0.98 * bound
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(1.0004, "1.001"), (0.9996, "0.999"), (1.0, "1.000"), (0.12, "0.12"), (None, "–")],
+)
+def test_a_tightness_off_one_does_not_read_as_one(value, words):
+    assert table.tightness_in_words(value) == words
 
 
 def test_an_elastic_beam_is_described_by_its_bending_stiffness():

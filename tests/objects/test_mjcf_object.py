@@ -194,6 +194,10 @@ REFUSALS = {
     "nonlinear damping": (swapped('damping="0.1"', 'damping="0.1 0.2"'), "nonlinear"),
     "nonlinear spring": (swapped('stiffness="1"', 'stiffness="1 0.2"'), "nonlinear"),
     "narrow limits": (swapped('damping="0.1"', 'damping="0.1" range="-0.3 0.3"'), "swing"),
+    "limits with a margin": (
+        swapped('damping="0.1"', 'damping="0.1" range="-1.2 1.2" margin="0.5"'),
+        "swing",
+    ),
     "upside down": (swapped('pos="0 0 -0.2" mass="1"', 'pos="0 0 0.8" mass="1"'), "stable"),
     "second root": ({"body": PENDULUM + '<body><geom size="0.1"/></body>'}, "one body"),
     "other gravity": ({"option": "<option gravity='0 0 -1'/>"}, "gravity"),

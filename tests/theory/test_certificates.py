@@ -219,3 +219,27 @@ def test_conditions_that_nothing_is_carried_under_are_refused():
 def test_objects_damped_next_to_nothing_are_refused_at_once():
     with pytest.raises(CertificateError, match="damping ratios"):
         certify(BeamParams(damping=1e-6))
+
+
+def test_a_certificate_can_be_lowered_but_not_raised():
+    certificate = certify(BeamParams(), conditions=TRANSPORT_CONDITIONS)
+    half = certificate.lowered(certificate.acceleration_bound / 2)
+    assert half.acceleration_bound == certificate.acceleration_bound / 2
+    assert half.nu_max == pytest.approx(half.resulting_acceleration)
+    assert half.proof == "nonlinear" and half.conditions == certificate.conditions
+    for bound in (0.0, math.nan, 1.01 * certificate.acceleration_bound):
+        with pytest.raises(ParameterError, match="acceleration_bound_m_s2"):
+            certificate.lowered(bound)
+
+
+def test_what_is_proven_for_the_nonlinear_object_is_a_certificate_of_its_own():
+    beam = BeamParams(segment_count=2, damping=1.0, joint_damping=1.0)
+    linear = certify(beam)
+    proven = linear.proven()
+    assert (linear.proof, proven.proof) == ("linear", "nonlinear")
+    assert proven.acceleration_bound == linear.nonlinear_limit
+    assert proven.proven() is proven
+    with pytest.raises(CertificateError, match="nonlinear_limit"):
+        certify(linearize(beam)).proven()
+    with pytest.raises(CertificateError, match="nonlinear_limit"):
+        certify(beam, method="tanner_printed").proven()
