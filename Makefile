@@ -45,7 +45,7 @@ install: $(INSTALLED)  ## create .venv with the project and its pinned dependenc
 compare: $(CORE)  ## run all controllers on the same scenarios; table and HTML report
 	$(BIN)/python evaluate.py
 
-benchmark: $(INSTALLED)  ## run all suites with all agents; writes docs/results.md and the agents' scores
+benchmark: $(CORE)  ## run all suites with all agents; writes docs/results.md and the agents' scores
 	$(BIN)/python evaluate.py --suites all --episodes all --members all --output results/benchmark
 	$(BIN)/defmanip agents --score results/benchmark
 	$(BIN)/python docs/make_results.py
