@@ -1,10 +1,12 @@
-"""The Makefile finds a Python that works, and says so where there is none."""
+"""Installation: the Makefile finds a Python that works, and the citation names the version."""
 
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[1]
 WORKS = "#!/bin/sh\nif [ $1 = -c ]; then exit 0; fi\necho made by ${0##*/}\n"
@@ -53,3 +55,11 @@ def test_without_a_python_make_says_what_is_missing(words, tmp_path):
     assert answer.returncode != 0
     assert "Python 3.11 or newer" in answer.stderr
     assert "PYTHON=" in answer.stderr
+
+
+def test_the_citation_names_the_package_as_it_is():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert citation["title"] == project["name"]
+    assert citation["version"] == project["version"]
+    assert citation["license"] == project["license"]
