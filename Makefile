@@ -1,8 +1,12 @@
 # The project's menu: make compare | benchmark | agents | test | lint | check | clean
-PYTHON ?= python3.11
+# PYTHON=... names the interpreter; else the first of these that runs and is new enough makes .venv
+PYTHON ?=
+PYTHONS := $(or $(PYTHON),python3.11 python3.12 python3.13 python3.14 python3)
 VENV := .venv
 BIN := $(VENV)/bin
+CORE := $(VENV)/.core
 INSTALLED := $(VENV)/.installed
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 
 .PHONY: help install compare benchmark agents committed test lint check clean
 
@@ -16,19 +20,32 @@ recipe_and_seed = --algo $(firstword $(subst -seed, ,$*))$(1) --seed $(lastword 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
-# torch first, and pinned: whatever depends on it then takes the build that is already there
-$(INSTALLED): pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt torch
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[train,dev]'
+# A candidate is run, since a name on the path need not be a Python that works
+$(BIN)/python:
+	@for python in $(PYTHONS); do \
+	  if $$python -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
+	  then echo "$$python -m venv $(VENV)"; $$python -m venv $(VENV); exit; fi; \
+	done; \
+	echo "None of these is a Python 3.11 or newer with its venv module: $(PYTHONS)." >&2; \
+	echo "Install one, or name one: make ... PYTHON=/path/to/python" >&2; \
+	exit 1
+
+$(CORE): pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP_INSTALL) --editable .
 	touch $@
+
+# torch first, and pinned: whatever depends on it then takes the build that is already there
+$(INSTALLED): pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP_INSTALL) torch
+	$(PIP_INSTALL) --editable '.[train,dev]'
+	touch $(CORE) $@
 
 install: $(INSTALLED)  ## create .venv with the project and its pinned dependencies
 
-compare: $(INSTALLED)  ## run all controllers on the same scenarios; table and HTML report
+compare: $(CORE)  ## run all controllers on the same scenarios; table and HTML report
 	$(BIN)/python evaluate.py
 
-benchmark: $(INSTALLED)  ## run all suites with all agents; writes docs/results.md and the agents' scores
+benchmark: $(CORE)  ## run all suites with all agents; writes docs/results.md and the agents' scores
 	$(BIN)/python evaluate.py --suites all --episodes all --members all --output results/benchmark
 	$(BIN)/defmanip agents --score results/benchmark
 	$(BIN)/python docs/make_results.py

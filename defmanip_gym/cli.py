@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -91,9 +92,15 @@ def _run(config: object) -> None:
 
 
 def _guarded(command: Callable[[], None]) -> None:
-    """Show this package's own errors as messages, without a traceback."""
+    """Show this package's own errors as messages, and end quietly when nobody reads on."""
     try:
-        command()
+        try:
+            command()
+        finally:
+            sys.stdout.flush()  # a closed pipe shows here, not when the interpreter ends
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the last flush
+        sys.exit(141)  # as a shell reports a program that SIGPIPE ended
     except DefmanipError as error:
         Console(stderr=True).print(
             f"[bold red]{type(error).__name__}[/]: {escape(str(error))}", highlight=False

@@ -29,6 +29,20 @@ def test_defmanip_lists_its_commands():
     assert "train" in answer.stdout and "compare" in answer.stdout
 
 
+@pytest.mark.parametrize("words", [("--help",), ("agents",)])
+def test_a_reader_that_goes_away_ends_a_command_quietly(words):
+    program = subprocess.Popen(
+        [sys.executable, "-m", "defmanip_gym", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+    program.stdout.close()
+    assert program.stderr.read() == ""
+    assert program.wait() != 0
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
