@@ -11,7 +11,10 @@ function's own file is; these functions call others, in other files, so all of t
 from __future__ import annotations
 
 import functools
+import glob
 import hashlib
+import logging
+import pickle
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -20,7 +23,7 @@ from typing import Any, ParamSpec, TypeAlias, TypeVar
 import numba
 import numba.extending
 from filelock import FileLock
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
 # In functions that are both: a number in compiled code, an array (...) when called from Python.
 Numbers: TypeAlias = Any
@@ -34,19 +37,22 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
 
     Division by zero gives infinity or NaN, as in NumPy. Without the Global Interpreter Lock.
     """
-    jitted = numba.njit(nogil=True, error_model="numpy")(function)
+    # nobody calls these from C: without an entry for it less passes through LLVM
+    jitted = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)
     if hasattr(jitted, "_cache"):  # not with NUMBA_DISABLE_JIT=1, which leaves plain Python
-        with suppress(RuntimeError):  # no folder can be written: compile anew in every process
+        try:
             jitted._cache = _PackageCache(function)
+        except RuntimeError:  # no folder can be written: compile anew in every process
+            jitted._cache = _NothingKept()
     result: Callable[Parameters, Result] = jitted
     return result
 
 
 def compilable(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Let compiled functions call this one; called from Python it stays NumPy on batches."""
-    marked: Callable[Parameters, Result] = numba.extending.register_jitable(error_model="numpy")(
-        function
-    )
+    marked: Callable[Parameters, Result] = numba.extending.register_jitable(
+        error_model="numpy", no_cfunc_wrapper=True
+    )(function)
     return marked
 
 
@@ -92,25 +98,69 @@ def sources_stamp(package: Path) -> str:
     return digest.hexdigest()
 
 
+_UNTOLD = iter((True,))
+
+
+def _tell_once(what_is_kept: str) -> None:
+    """Say once in a process that it compiles; where a user sees it, whom the seconds surprise."""
+    if next(_UNTOLD, False):
+        logging.getLogger("defmanip_gym").warning(
+            "defmanip_gym: compiling, which takes some seconds; %s", what_is_kept
+        )
+
+
+class _NothingKept(NullCache):
+    """In place of a cache where no folder can be written."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> None:
+        """Return None, for there is nothing."""
+        _tell_once(
+            "no folder for machine code can be written, so every process will do so. "
+            "Set NUMBA_CACHE_DIR to a folder that can."
+        )
+
+
 class _PackageCache(FunctionCache):
     """Numba's cache, current as long as no compiled source of the package has changed."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call]
-        self._lock = FileLock(Path(self._cache_path) / f"{self._impl.filename_base}.lock")
+        stamp = sources_stamp(Path(__file__).parent)
+        base = self._impl.filename_base
+        self._lock_path = Path(self._cache_path) / f"{base}.lock"
         self._cache_file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
-            cache_path=self._cache_path,
-            filename_base=self._impl.filename_base,
-            source_stamp=sources_stamp(Path(__file__).parent),
+            cache_path=self._cache_path, filename_base=base, source_stamp=stamp
         )
+        # Numba writes the index first. A process killed before it has written the machine code
+        # must not leave an index of these sources that names the code of others.
+        self._cache_file._data_name_pattern = f"{base}.{stamp}.{{number:d}}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for a signature, or None."""
-        loaded = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        try:
+            loaded = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except (OSError, EOFError, ValueError, pickle.UnpicklingError):  # damaged files
+            loaded = None
         # processes that save at once without a lock leave files of other signatures
-        return loaded if loaded is not None and loaded.signature.args == tuple(sig) else None
+        if loaded is not None and loaded.signature.args == tuple(sig):
+            return loaded
+        _tell_once(f"the machine code is kept for the next time (in {self._cache_path}).")
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Save machine code; one process at a time, as Numba chooses file names by an index."""
-        with self._lock:
+        """Save machine code; one process at a time, as Numba chooses file names by an index.
+
+        The lock is made anew each time: one made before a fork is of no use in the child. A disk
+        that is full or can no longer be written keeps nobody from computing.
+        """
+        with suppress(OSError, NotImplementedError), FileLock(self._lock_path):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+            self._clear()
+
+    def _clear(self) -> None:
+        """Remove what other sources and killed processes have left."""
+        kept = {self._lock_path.name, self._cache_file._index_name}
+        kept.update(self._cache_file._load_index().values())
+        for path in self._lock_path.parent.glob(f"{glob.escape(self._impl.filename_base)}.*"):
+            if path.name not in kept:
+                path.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
+import pytest
 
 import defmanip_gym
 from defmanip_gym.compiled import compiled, compiled_sources, sources_stamp
@@ -75,6 +76,82 @@ def test_machine_code_of_another_signature_is_not_taken():
     assert cache.load_overload((real,), doubled.targetctx) is None
     for name in files.values():
         (folder / name).unlink()
+    cache.flush()
+
+
+def run(script, **environment):
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+SOLVE = """
+import numpy as np
+from defmanip_gym.theory.chain import solve_positive_definite
+def solve():
+    b = np.ones(1)
+    solve_positive_definite(np.full((1, 1), 2.0), b)
+    assert b[0] == 0.5
+"""
+CHILDREN = """
+if __name__ == "__main__":
+    import multiprocessing, threading
+    children = [multiprocessing.get_context("fork").Process(target=solve) for _ in range(2)]
+    for child in children: child.start()
+    for child in children: child.join()
+    assert [child.exitcode for child in children] == [0, 0], children
+    threads = [threading.Thread(target=solve) for _ in range(4)]
+    for thread in threads: thread.start()
+    for thread in threads: thread.join()
+    assert solve_positive_definite.overloads
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_forked_children_and_threads_compile_first(tmp_path):
+    done = run(SOLVE + CHILDREN, NUMBA_CACHE_DIR=str(tmp_path))
+    assert done.returncode == 0, done.stderr
+
+
+def test_compiling_is_told_once_and_only_when_nothing_was_kept(tmp_path):
+    first, second = (run(SOLVE + "solve()", NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
+    assert first.returncode == second.returncode == 0, first.stderr
+    assert first.stderr.count("compiling") == 1
+    assert "kept for the next time" in first.stderr
+    assert first.stdout == second.stdout == second.stderr == ""
+
+
+def test_where_nothing_can_be_kept_the_user_is_told_the_remedy(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    refusing = "import numba; numba.config.CACHE_LOCATOR_CLASSES = 'UserProvidedCacheLocator'\n"
+    done = run(refusing + SOLVE + "solve()", NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("NUMBA_CACHE_DIR") == 1
+
+
+def test_a_killed_process_leaves_no_machine_code_of_other_sources():
+    @compiled
+    def halved(x):
+        return x / 2
+
+    halved.compile((numba.float64,))
+    cache, files = halved._cache, halved._cache._cache_file
+    (name,), folder = files._load_index().values(), Path(cache._cache_path)
+    stamp = sources_stamp(Path(defmanip_gym.__file__).parent)
+    assert stamp in name
+    (folder / name).write_bytes((folder / name).read_bytes()[:100])
+    assert cache.load_overload((numba.float64,), halved.targetctx) is None
+    left = folder / name.replace(stamp, "another")
+    left.write_bytes(b"")
+    cache.save_overload((numba.float64,), next(iter(halved.overloads.values())))
+    assert cache.load_overload((numba.float64,), halved.targetctx) is not None
+    assert not left.exists()
+    (folder / name).unlink()
     cache.flush()
 
 

@@ -65,8 +65,10 @@ class InnerLoop:
         actions = np.empty(self._shape)
         state = PlantState.empty(num_envs, config.beam.segment_count)
         self._clip = machine_code(_clip, actions)
-        self._scale = machine_code(_scale, self._force_limits, actions, forces)
-        self._linearize = machine_code(_linearize, self._constants, actions, state, forces)
+        if self._mode == "force":  # whose first environment need not wait for the linearization
+            self._scale = machine_code(_scale, self._force_limits, actions, forces)
+        else:
+            self._linearize = machine_code(_linearize, self._constants, actions, state, forces)
 
     def clipped(self, actions: Any, idle: BoolArray | None = None) -> Array:
         """Return the actions, (n, k), clipped to [-1, 1].
