@@ -118,7 +118,8 @@ def vector_section(config: ThroughputConfig) -> list[Figure]:
         single_candidate("single env", gymnasium.make(ENV_ID, **options)),
     ]
     for size in (64, _BATCH):
-        for_gymnasium, for_sb3 = (config.batched_env(size, "task") for _ in range(2))
+        for_gymnasium = config.batched_env(size, "task")
+        for_sb3 = config.batched_env(size, "task", autoreset_mode="SameStep")
         candidates += [
             vector_candidate(f"make_vec({size})", for_gymnasium),
             sb3_candidate(f"Sb3VecEnv({size})", Sb3VecEnv(for_sb3)),

@@ -73,7 +73,10 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             raise ParameterError(
-                "autoreset_mode", mode, "AutoresetMode.SAME_STEP", "Make the batch in that mode."
+                "autoreset_mode",
+                mode,
+                "AutoresetMode.SAME_STEP",
+                "Make the batch by make_vec(..., autoreset_mode='SameStep').",
             )
         decision_periods = required_periods(decision_periods)
         base, bound = _base_and_certificate(env, certificate)

@@ -90,9 +90,10 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
     | reward_deformation | in `constraint_mode="penalty"`: -(‖z2‖∞/σ - 1) while σ is exceeded     |
 
     Every step's `info` also holds `is_success` and, in every mode, `cost` (1.0 while ‖z2‖∞ > σ,
-    else 0.0), `constraint_margin` (σ − ‖z2‖∞, rad), `cost_speed` (grasp speed beyond the limit,
-    m/s), `left_workspace`, `simulation_failed`, `distance_to_goal` (m), and what the true beam of
-    this episode is: `beam_damping` (N·m·s/rad), `beam_mass_kg` and `beam_length_m`.
+    else 0.0), `episode_cost` (its sum over the steps of the episode so far), `constraint_margin`
+    (σ − ‖z2‖∞, rad), `cost_speed` (grasp speed beyond the limit, m/s), `left_workspace`,
+    `simulation_failed`, `distance_to_goal` (m), and what the true beam of this episode is:
+    `beam_damping` (N·m·s/rad), `beam_mass_kg` and `beam_length_m`.
 
     ## Starting State
     At rest, uniformly within ±(1.5 m, 1.5 m, 0.5 rad, 0.1 rad, 0.1 rad, 0.05 rad) of the paper's

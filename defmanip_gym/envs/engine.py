@@ -129,13 +129,10 @@ class TransportEngine:
     def info(self) -> dict[str, Any]:
         """What the last step or reset tells beside observation and reward, by name, (n,) each."""
         scores = self._scores
-        return dict(
-            zip(
-                _INFO_KEYS,
-                chain(scores.told_flags, scores.measures, self._beams.copy()),
-                strict=True,
-            )
-        )
+        # a copy: the next step adds to it
+        costs = (scores.episode_costs.copy(),)
+        values = chain(scores.told_flags, scores.measures, costs, self._beams.copy())
+        return dict(zip(_INFO_KEYS, values, strict=True))
 
     @property
     def single_info(self) -> dict[str, Any]:
@@ -144,6 +141,7 @@ class TransportEngine:
         values = (
             *scores.told_flags[:, 0].tolist(),
             *scores.measures[:, 0].tolist(),
+            scores.episode_costs.item(),
             *self._beams[:, 0].tolist(),
         )
         return dict(zip(_INFO_KEYS, values, strict=True))
@@ -272,7 +270,14 @@ class TransportEngine:
         self.simulation.report(ids, force_b)
 
 
-_INFO_KEYS = (*FLAGS, *MEASURES, "beam_damping", "beam_mass_kg", "beam_length_m")
+_INFO_KEYS = (
+    *FLAGS,
+    *MEASURES,
+    "episode_cost",
+    "beam_damping",
+    "beam_mass_kg",
+    "beam_length_m",
+)
 _varied = attrgetter("damping", "mass_kg", "length_m")
 
 

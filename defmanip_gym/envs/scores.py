@@ -40,7 +40,8 @@ _TERMINATED, _TRUNCATED = len(FLAGS), len(FLAGS) + 1
 _TERMS = MEASURES.index(RewardTerms._fields[0])
 _REWARD = len(MEASURES)
 _POTENTIALS = _REWARD + 1
-_NUMBER_COUNT = _POTENTIALS + len(Potentials._fields)
+_COST, _EPISODE_COST = MEASURES.index("cost"), _POTENTIALS + len(Potentials._fields)
+_NUMBER_COUNT = _EPISODE_COST + 1
 
 
 class Scores(NamedTuple):
@@ -49,7 +50,7 @@ class Scores(NamedTuple):
     Attributes:
         observations: (n, size), without sensor noise until that is added.
         flags: ``FLAGS``, then whether it terminated and whether it was truncated, (5, n).
-        numbers: ``MEASURES``, then reward and potentials, (16, n).
+        numbers: ``MEASURES``, then reward, potentials and the episode's cost, (17, n).
     """
 
     observations: Array
@@ -78,6 +79,12 @@ class Scores(NamedTuple):
     def measures(self) -> Array:
         """``MEASURES``, (12, n)."""
         return self.numbers[:_REWARD]
+
+    @property
+    def episode_costs(self) -> Array:
+        """The sum of ``cost`` over the steps of each episode so far, (n,)."""
+        costs: Array = self.numbers[_EPISODE_COST]
+        return costs
 
     @property
     def rewards(self) -> Array:
@@ -109,6 +116,7 @@ def score_starts(
         outcome = Outcome(is_success(state, task), False, False)
         _report(scores, i, state, outcome, no_reward, potentials(state, task), task)
         scores.flags[_TERMINATED, i] = scores.flags[_TRUNCATED, i] = False
+        scores.numbers[_EPISODE_COST, i] = 0.0
 
 
 @compiled
@@ -159,6 +167,9 @@ def score_steps(
         now = potentials(state, task)
         terms = reward_terms(last, now, squared_action, outcome, margin, task)
         _report(scores, i, state, outcome, terms, now, task)
+        scores.numbers[_EPISODE_COST, i] = (
+            before.numbers[_EPISODE_COST, i] + scores.numbers[_COST, i]
+        )
         terminated = outcome.success or is_failure(outcome, margin, task)
         scores.flags[_TERMINATED, i] = terminated
         scores.flags[_TRUNCATED, i] = steps[i] >= last_step and not terminated

@@ -32,15 +32,19 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """n episodes of :class:`~defmanip_gym.envs.deform_transport.DeformTransportEnv` in one batch.
 
     Everything but the arguments below is as documented there. In ``info`` every key holds an
-    array over the episodes.
+    array over the episodes, valid for all of them (there are no masks ``_key``). Where an episode
+    ends in ``SAME_STEP`` mode, ``info`` tells of its successor, whose ``cost`` is 0: what its last
+    step cost is in ``final_info`` only, and ``final_info["episode_cost"]`` is the episode's sum. In
+    the other modes the last step's own ``info`` has both.
 
     Args:
         num_envs: n.
         max_episode_steps: control periods until truncation.
-        autoreset_mode: ``SAME_STEP`` (default) resets an ended episode within the step and puts
-            its last observation and info in ``info["final_obs"]`` and ``info["final_info"]``;
-            ``NEXT_STEP`` resets it in the following step, whose action it ignores; ``DISABLED``
-            leaves that to ``reset(options={"reset_mask": mask})``.
+        autoreset_mode: ``NEXT_STEP`` (default, as in Gymnasium's own) resets an ended episode in
+            the following step, whose action it ignores; ``SAME_STEP`` resets it within the step and
+            puts its last observation and info in ``info["final_obs"]`` and ``info["final_info"]``,
+            marked by ``_final_obs`` and ``_final_info``; ``DISABLED`` leaves that to
+            ``reset(options={"reset_mask": mask})``. Or their values, such as ``"SameStep"``.
         num_threads: physics threads, 0 for one per CPU.
         render_mode: as in the single environment; ``render`` returns a tuple of n images.
         control_mode: as in the single environment, like all that follow.
@@ -58,7 +62,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     metadata: dict[str, Any] = {
         "render_modes": list(RENDER_MODES[1:]),
         "render_fps": 50,
-        "autoreset_mode": AutoresetMode.SAME_STEP,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
     def __init__(
@@ -66,7 +70,7 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         num_envs: int = 1,
         *,
         max_episode_steps: int = MAX_EPISODE_STEPS,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         num_threads: int = 0,
         render_mode: str | None = None,
         control_mode: ControlMode = "task",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
+from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecNormalize
 
 from defmanip_gym.errors import DefmanipError, ParameterError
@@ -55,6 +56,7 @@ def _sb3_env(config: TrainConfig, hyperparameters: dict[str, Any], num_envs: int
             f"defmanip_gym:{env_id}",
             num_envs=num_envs,
             num_threads=config.num_threads,
+            autoreset_mode=AutoresetMode.SAME_STEP,
             **arguments,
         )
     except DefmanipError:

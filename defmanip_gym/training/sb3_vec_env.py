@@ -17,9 +17,17 @@ from defmanip_gym.errors import ParameterError, StartError
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 
+_SPACES = ("observation_space", "action_space")
+_ONE_FOR_EACH = ("np_random", "np_random_seed", "render")
+
 
 class Sb3VecEnv(VecEnv):
     """Presents a batched environment in SAME_STEP mode to SB3, without a loop over its episodes.
+
+    To SB3 each episode is an environment. Attributes and methods are the batch's, looked for from
+    the outermost wrapper inwards, and every index gets the same; what Gymnasium keeps for each
+    episode (``np_random``, ``np_random_seed``, images of ``render``) and the spaces are those of
+    the index.
 
     The info dict of an episode that ends holds what SB3 reads (``terminal_observation``,
     ``TimeLimit.truncated``, and ``episode`` with return, length and cost) and the environment's
@@ -31,13 +39,15 @@ class Sb3VecEnv(VecEnv):
         env: the package's batched environment, with its vector wrappers if any.
 
     Raises:
-        ParameterError: the environment resets in another way.
+        ParameterError: the environment resets in another way, as it does by default.
 
     Example:
         >>> import gymnasium
         >>> from stable_baselines3 import PPO
         >>> from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
-        >>> env = gymnasium.make_vec("defmanip_gym:DeformTransport-v0", num_envs=64)
+        >>> env = gymnasium.make_vec(
+        ...     "defmanip_gym:DeformTransport-v0", num_envs=64, autoreset_mode="SameStep"
+        ... )
         >>> model = PPO("MlpPolicy", Sb3VecEnv(env), n_steps=32, batch_size=1024)
         >>> model.learn(1_000_000)  # doctest: +SKIP
     """
@@ -49,7 +59,8 @@ class Sb3VecEnv(VecEnv):
                 "autoreset_mode",
                 mode,
                 "AutoresetMode.SAME_STEP",
-                "SB3 expects ended episodes to be reset within the step.",
+                "SB3 expects ended episodes to be reset within the step: make the batch by "
+                "make_vec(..., autoreset_mode='SameStep').",
             )
         self.env = env
         self.spec = env.spec
@@ -57,7 +68,6 @@ class Sb3VecEnv(VecEnv):
         self._actions: NDArray[Any]
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
-        self._costs = np.zeros(env.num_envs)
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         # as the video recorder reads it
         self.metadata |= {"render_fps": env.metadata.get("render_fps", 30)}
@@ -73,8 +83,7 @@ class Sb3VecEnv(VecEnv):
         observation, info = self.env.reset(seed=seeds, options=options)  # type: ignore[arg-type]
         self._reset_seeds()
         self._reset_options()
-        for tally in (self._returns, self._lengths, self._costs):
-            tally[:] = 0
+        self._returns[:] = self._lengths[:] = 0
         self.step_info = info
         self.reset_infos = _rows(info, np.arange(self.num_envs))
         return observation
@@ -96,42 +105,34 @@ class Sb3VecEnv(VecEnv):
             infos[i]["cost"] = float(info["cost"][i])
         ids = np.flatnonzero(ended)
         if len(ids):
-            last = info["final_info"]
-            self._costs += np.where(ended, last["cost"], info["cost"])
-            for i, ending in zip(
-                ids, self._endings(ids, last, info, truncated & ~terminated), strict=True
-            ):
+            endings = self._endings(ids, info, truncated & ~terminated)
+            for i, ending in zip(ids, endings, strict=True):
                 infos[i] = ending
-            for tally in (self._returns, self._lengths, self._costs):
-                tally[ids] = 0
-        else:
-            self._costs += info["cost"]
+            self._returns[ids] = self._lengths[ids] = 0
         # SB3 adds the value of truncated episodes to the rewards in place: a copy
         return observation, reward.astype(np.float32), ended, infos
 
     def _endings(
-        self, ids: Ids, last: dict[str, Any], info: dict[str, Any], truncated: NDArray[np.bool_]
+        self, ids: Ids, info: dict[str, Any], truncated: NDArray[np.bool_]
     ) -> list[dict[str, Any]]:
         """Return the info dicts of the episodes that ended, and note the infos of their successors.
 
         Args:
             ids: the episodes, (k,).
-            last: their info before the reset.
-            info: their info after it.
+            info: the batch's, with what they ended with in ``final_info``.
             truncated: which were truncated, (n,).
         """
-        endings = _rows(last, ids)
+        endings = _rows(info["final_info"], ids)
         columns = (
             info["final_obs"][ids],
             truncated[ids].tolist(),
             self._returns[ids].tolist(),
             self._lengths[ids].tolist(),
-            self._costs[ids].tolist(),
         )
-        for ending, observation, cut, total, length, cost in zip(endings, *columns, strict=True):
+        for ending, observation, cut, total, length in zip(endings, *columns, strict=True):
             ending["terminal_observation"] = observation
             ending["TimeLimit.truncated"] = cut
-            ending["episode"] = {"r": total, "l": length, "cost": cost}
+            ending["episode"] = {"r": total, "l": length, "cost": ending["episode_cost"]}
         for i, first in zip(ids, _rows(info, ids), strict=True):
             self.reset_infos[i] = first
         return endings
@@ -159,26 +160,89 @@ class Sb3VecEnv(VecEnv):
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return the batch's attribute once for each index."""
-        value = self._attribute(attr_name)
-        return [value for _ in self._get_indices(indices)]
+        """Return the attribute of each index.
+
+        Raises:
+            AttributeError: neither the batch nor one of its wrappers has it.
+        """
+        if attr_name in _SPACES:
+            attr_name = f"single_{attr_name}"
+        value = getattr(self._layer_with(attr_name), attr_name)
+        return self._of_each(attr_name, value, indices)
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Refuse: the episodes of a batch share their attributes."""
-        raise AttributeError(f"{attr_name} belongs to the whole batch; set it on `.env`.")
+        """Set an attribute of the batch: where it is, or on the outermost wrapper if it is new.
+
+        Raises:
+            ParameterError: indices that leave episodes out: they share their attributes.
+            AttributeError: it cannot be set.
+        """
+        if len({int(i) % self.num_envs for i in self._get_indices(indices)}) < self.num_envs:
+            raise ParameterError(
+                "indices",
+                indices,
+                "None, or all episodes",
+                f"{attr_name} is set for the whole batch: its episodes share their attributes.",
+            )
+        layer = self._layer_with(attr_name) if self.has_attr(attr_name) else self.env
+        setattr(layer, attr_name, value)
 
     def env_method(
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
-        """Call the batch's method and return its result once for each index."""
-        result = self._attribute(method_name)(*args, **kwargs)
-        return [result for _ in self._get_indices(indices)]
+        """Call the batch's method once and return its result for each index.
 
-    def _attribute(self, name: str) -> Any:
+        ``get_wrapper_attr``, ``has_wrapper_attr`` and ``set_wrapper_attr``, which only single
+        environments have, do what ``get_attr``, ``has_attr`` and ``set_attr`` do.
+
+        Raises:
+            ParameterError: a method that would step, reset or close the episodes behind SB3's
+                back.
+            AttributeError: neither the batch nor one of its wrappers has it.
+        """
+        if method_name in ("reset", "step", "close"):
+            raise ParameterError(
+                "method_name",
+                method_name,
+                "a method that leaves the episodes as they are",
+                f"Call {method_name} of the Sb3VecEnv, which does so for all of them.",
+            )
+        if method_name == "get_wrapper_attr":
+            return self._get_wrapper_attr(*args, indices=indices, **kwargs)
+        if method_name == "has_wrapper_attr":
+            result = self.has_attr(*args, **kwargs)
+        elif method_name == "set_wrapper_attr":
+            result = self._set_wrapper_attr(*args, indices=indices, **kwargs)
+        else:
+            result = getattr(self._layer_with(method_name), method_name)(*args, **kwargs)
+        return self._of_each(method_name, result, indices)
+
+    def has_attr(self, name: str) -> bool:
+        """Whether the batch or one of its wrappers has the attribute."""
+        return hasattr(self._layer_with(name), name)
+
+    def _get_wrapper_attr(self, name: str, *, indices: VecEnvIndices) -> list[Any]:
+        return self.get_attr(name, indices)
+
+    def _set_wrapper_attr(
+        self, name: str, value: Any, *, force: bool = True, indices: VecEnvIndices
+    ) -> bool:
+        is_set = force or self.has_attr(name)
+        if is_set:
+            self.set_attr(name, value, indices)
+        return is_set
+
+    def _layer_with(self, name: str) -> VectorEnv[Any, Any, Any]:
+        """Return the outermost layer that has the attribute, or the batch itself."""
         layer = self.env  # Gymnasium's vector wrappers do not hand attributes through
         while not hasattr(layer, name) and isinstance(layer, gymnasium.vector.VectorWrapper):
             layer = layer.env
-        return getattr(layer, name)
+        return layer
+
+    def _of_each(self, name: str, value: Any, indices: VecEnvIndices) -> list[Any]:
+        # by name, not by length: a tuple of two need not be one for each of two episodes
+        is_shared = name not in _ONE_FOR_EACH or not isinstance(value, tuple)
+        return [value if is_shared else value[i] for i in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
         """Whether the batch is in such a wrapper; true of ``Monitor``, whose work is done here."""

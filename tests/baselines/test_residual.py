@@ -21,6 +21,10 @@ from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 ID = "defmanip_gym:DeformTransport-v0"
 
 
+def make(autoreset_mode="SameStep", **arguments):
+    return gymnasium.make_vec(ID, autoreset_mode=autoreset_mode, **arguments)
+
+
 @pytest.fixture(scope="module")
 def certificate():
     return certify(BeamParams(), method="phase_plane", conditions=TRANSPORT_CONDITIONS)
@@ -44,7 +48,7 @@ def test_correction_is_limited_in_itself_and_with_the_base():
 
 
 def test_zero_residual_leaves_the_papers_controller_alone(certificate):
-    envs = gymnasium.make_vec(ID, num_envs=3)
+    envs = make(num_envs=3)
     observation, _ = envs.reset(seed=0)
     base = TannerController(certificate=certificate)
     both = ResidualController(base, ZeroController(), authority=0.5, decision_periods=4)
@@ -82,11 +86,9 @@ def test_training_environment_does_what_the_controller_does_later(certificate):
     """Residual actions in the wrapper, and the same policy as a controller, move alike."""
     residual = Constant(0.7, -0.2, 0.1)
     training = ResidualVectorAction(
-        gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40), decision_periods=5, authority=2.0
+        make(num_envs=2, max_episode_steps=40), decision_periods=5, authority=2.0
     )
-    later = NuMaxVectorActionScaling(
-        gymnasium.make_vec(ID, num_envs=2, max_episode_steps=40), certificate
-    )
+    later = NuMaxVectorActionScaling(make(num_envs=2, max_episode_steps=40), certificate)
     controller = ResidualController(
         TannerController(certificate=certificate),
         residual,
@@ -112,9 +114,9 @@ def test_training_environment_does_what_the_controller_does_later(certificate):
 
 def test_an_ending_amid_a_decision_is_told_with_its_last_observation_and_cost():
     """Episodes of 7 periods, decisions of 5: every other one is cut after 2 periods."""
-    env = gymnasium.make_vec(ID, num_envs=2, max_episode_steps=7, constraint_mode="cost")
+    env = make(num_envs=2, max_episode_steps=7, constraint_mode="cost")
     training = ResidualVectorAction(env, decision_periods=5)
-    plain = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=2, max_episode_steps=7))
+    plain = ResidualVectorAction(make(num_envs=2, max_episode_steps=7))
     training.reset(seed=1)
     plain.reset(seed=1)
     actions = np.full((2, 3), 0.5)
@@ -132,7 +134,7 @@ def test_an_ending_amid_a_decision_is_told_with_its_last_observation_and_cost():
 
 def test_single_and_batched_wrapper_agree():
     single = ResidualAction(gymnasium.make(ID), decision_periods=3)
-    batch = ResidualVectorAction(gymnasium.make_vec(ID, num_envs=1), decision_periods=3)
+    batch = ResidualVectorAction(make(num_envs=1), decision_periods=3)
     one, _ = single.reset(seed=5)
     many, _ = batch.reset(seed=5)
     rng = np.random.default_rng(0)
@@ -146,9 +148,7 @@ def test_single_and_batched_wrapper_agree():
 
 
 def test_wildest_residual_stays_within_sigma():
-    env = ResidualVectorAction(
-        gymnasium.make_vec(ID, num_envs=8, max_episode_steps=600), authority=15.0
-    )
+    env = ResidualVectorAction(make(num_envs=8, max_episode_steps=600), authority=15.0)
     _, info = env.reset(seed=0)
     smallest = info["constraint_margin"].min()
     for step in range(500):
@@ -160,7 +160,7 @@ def test_wildest_residual_stays_within_sigma():
 
 
 def test_batches_that_reset_otherwise_are_refused():
-    env = gymnasium.make_vec(ID, num_envs=2, autoreset_mode="NextStep")
+    env = make(num_envs=2, autoreset_mode="NextStep")
     with pytest.raises(ParameterError, match="SAME_STEP"):
         ResidualVectorAction(env)
     env.close()

@@ -23,7 +23,9 @@ def drawn(info):
 
 
 def test_every_episode_draws_a_beam_from_the_ranges_by_its_seed():
-    env = DeformTransportVectorEnv(16, beam_ranges=RANGES, max_episode_steps=2)
+    env = DeformTransportVectorEnv(
+        16, beam_ranges=RANGES, max_episode_steps=2, autoreset_mode="SameStep"
+    )
     first = drawn(env.reset(seed=0)[1])
     for row, ends in zip(first, (RANGES.damping, RANGES.mass_kg, RANGES.length_m), strict=True):
         assert ((row >= ends[0]) & (row <= ends[1])).all()

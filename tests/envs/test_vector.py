@@ -58,7 +58,7 @@ def test_threads_do_not_change_trajectories():
 
 
 def test_same_step_reset_hands_over_the_final_observation():
-    env = make(4, max_episode_steps=5)
+    env = make(4, max_episode_steps=5, autoreset_mode="SameStep")
     reference = make(4, max_episode_steps=5, autoreset_mode="Disabled")
     env.reset(seed=0), reference.reset(seed=0)
     for step in range(5):
@@ -75,7 +75,7 @@ def test_same_step_reset_hands_over_the_final_observation():
 
 
 def test_only_ended_episodes_are_reset():
-    env = make(2, constraint_mode="terminate")
+    env = make(2, constraint_mode="terminate", autoreset_mode="SameStep")
     env.reset(seed=3)
     for _ in range(60):
         observation, _, terminated, _, info = env.step(np.array([[1.0, 0, 0], [0.0, 0, 0]]))
@@ -88,7 +88,7 @@ def test_only_ended_episodes_are_reset():
 
 
 def test_next_step_reset_ignores_the_action_after_an_end():
-    env = make(3, max_episode_steps=4, autoreset_mode=AutoresetMode.NEXT_STEP)
+    env = make(3, max_episode_steps=4)
     assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
     env.reset(seed=0)
     for _ in range(4):
@@ -112,18 +112,20 @@ def test_disabled_reset_starts_the_masked_episodes_only():
     assert env.unwrapped.engine.steps.tolist() == [0, 1, 0]
 
 
-def test_autoreset_continues_each_episodes_own_generator():
-    first, second = make(2, max_episode_steps=2), make(2, max_episode_steps=2)
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_autoreset_continues_each_episodes_own_generator(mode):
+    first, second = (make(2, max_episode_steps=2, autoreset_mode=mode) for _ in range(2))
     rows = []
     for env in (first, second):
         env.reset(seed=9)
         rows.append([env.step(np.zeros((2, 3)))[0] for _ in range(5)])
     assert np.array_equal(rows[0], rows[1])
-    assert not np.array_equal(rows[0][1], rows[0][3])
+    assert not np.array_equal(rows[0][1], rows[0][4])
 
 
-def test_info_keys_are_the_same_at_reset_and_every_step():
-    env = make(2, max_episode_steps=3)
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_info_keys_are_the_same_at_reset_and_every_step(mode):
+    env = make(2, max_episode_steps=3, autoreset_mode=mode)
     _, info = env.reset(seed=0)
     keys = set(info)
     for _ in range(4):

@@ -53,7 +53,11 @@ def test_price_falls_to_zero_where_the_limit_is_generous():
 
 def test_batched_environment_tells_every_steps_cost():
     env = gymnasium.make_vec(
-        "defmanip_gym:DeformTransport-v0", num_envs=4, constraint_mode="cost", sigma_rad=0.06
+        "defmanip_gym:DeformTransport-v0",
+        num_envs=4,
+        autoreset_mode="SameStep",
+        constraint_mode="cost",
+        sigma_rad=0.06,
     )
     venv = Sb3VecEnv(env)
     venv.seed(0)

@@ -8,13 +8,19 @@ from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.training.validation_callback import ValidationCallback
 
 
+def batch():
+    return gymnasium.make_vec(
+        "defmanip_gym:DeformTransport-v0", num_envs=1, autoreset_mode="SameStep"
+    )
+
+
 def episode(success, length, cost=0.0):
     return {"done": True, "info": {"is_success": success, "episode": {"l": length, "cost": cost}}}
 
 
 @pytest.fixture
 def callback():
-    env = Sb3VecEnv(gymnasium.make_vec("defmanip_gym:DeformTransport-v0", num_envs=1))
+    env = Sb3VecEnv(batch())
     yield ValidationCallback(env, episodes=1, interval=1, on_best=lambda: None)
     env.close()
 
@@ -27,8 +33,7 @@ def test_only_arrivals_without_violation_score_and_sooner_is_better(callback):
 
 
 def test_decisions_that_are_held_count_against_decisions():
-    batch = gymnasium.make_vec("defmanip_gym:DeformTransport-v0", num_envs=1)
-    env = Sb3VecEnv(ResidualVectorAction(batch, decision_periods=25))
+    env = Sb3VecEnv(ResidualVectorAction(batch(), decision_periods=25))
     callback = ValidationCallback(env, episodes=1, interval=1, on_best=lambda: None)
     callback._is_success_buffer = []
     callback._log_success_callback(episode(True, 10), {})  # 10 of 40 decisions
