@@ -12,7 +12,7 @@ from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import CertificateConditions, ParameterIntervals, certify
 from defmanip_gym.theory.conditions import EXACT_PARAMETERS
 from defmanip_gym.theory.limits import linear_limit
-from defmanip_gym.theory.nonlinear_margin import nonlinear_limit_in_box
+from defmanip_gym.theory.nonlinear_margin import _off_centre, nonlinear_limit_in_box
 from defmanip_gym.theory.zero_dynamics import linearize
 
 SIGMA = math.pi / 6
@@ -87,6 +87,20 @@ def test_peaks_of_several_segments_are_never_exceeded(segments):
     start = np.zeros((60, segments))
     peak = largest_swing(chain_acceleration(beam), pumping, start, duration_s=6.0, period_s=0.005)
     assert peak.max() <= SIGMA
+
+
+@pytest.mark.parametrize(("segments", "share"), [(2, 0.8), (3, 0.7)])
+def test_much_of_l1_is_proven_for_stiff_and_well_damped_beams(segments, share):
+    beam = BeamParams(damping=1.0, segment_count=segments, joint_stiffness=20.0, joint_damping=0.5)
+    assert share * certify(beam).nu_max < limit(beam) < certify(beam).nu_max
+
+
+@pytest.mark.parametrize("share", [1.0, 0.977, 0.9])
+def test_gravity_off_its_centre_is_never_underestimated(share):
+    angles = np.linspace(0.0, 1.04, 500)
+    exact = np.maximum.accumulate(np.abs(share * angles - np.sin(angles)))
+    np.testing.assert_allclose(_off_centre(angles, share), exact, atol=1e-6)
+    assert (_off_centre(angles, share) >= exact - 1e-15).all()
 
 
 @pytest.mark.parametrize("method", ["tanner", "lyapunov"])
