@@ -38,7 +38,7 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
     Division by zero gives infinity or NaN, as in NumPy. Without the Global Interpreter Lock.
     """
     # nobody calls these from C: without an entry for it less passes through LLVM
-    jitted = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)
+    jitted = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[call-overload]
     if hasattr(jitted, "_cache"):  # not with NUMBA_DISABLE_JIT=1, which leaves plain Python
         try:
             jitted._cache = _PackageCache(function)
@@ -160,7 +160,7 @@ class _PackageCache(FunctionCache):
     def _clear(self) -> None:
         """Remove what other sources and killed processes have left."""
         kept = {self._lock_path.name, self._cache_file._index_name}
-        kept.update(self._cache_file._load_index().values())
+        kept.update(self._cache_file._load_index().values())  # type: ignore[no-untyped-call]
         for path in self._lock_path.parent.glob(f"{glob.escape(self._impl.filename_base)}.*"):
             if path.name not in kept:
                 path.unlink(missing_ok=True)

@@ -83,12 +83,12 @@ def moving_motions(
         ),
         axis=-1,
     )
-    pitch_rate = np.linalg.solve(kinematics.jacobian(pitch), rates[..., None])[..., 0]
+    pitch_rate: Array = np.linalg.solve(kinematics.jacobian(pitch), rates[..., None])[..., 0]
     forward = _about_zero(rng, config.task.max_speed_m_s, (count,))
     swing, swing_rate = _swings(config, certificate, count, rng)
     return Motions(
         joints=joints,
-        joint_rates=pitch_rate @ PITCH_TO_JOINT.T,
+        joint_rates=np.asarray(pitch_rate @ PITCH_TO_JOINT.T, dtype=np.float64),
         base_velocity=np.stack(
             (
                 forward - rates[:, 0],
