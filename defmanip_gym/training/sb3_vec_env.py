@@ -210,19 +210,22 @@ class Sb3VecEnv(VecEnv):
         if method_name == "get_wrapper_attr":
             return self._get_wrapper_attr(*args, indices=indices, **kwargs)
         if method_name == "has_wrapper_attr":
-            result = self.has_attr(*args, **kwargs)
+            result: Any = self._has_wrapper_attr(*args, **kwargs)
         elif method_name == "set_wrapper_attr":
             result = self._set_wrapper_attr(*args, indices=indices, **kwargs)
         else:
             result = getattr(self._layer_with(method_name), method_name)(*args, **kwargs)
         return self._of_each(method_name, result, indices)
 
-    def has_attr(self, name: str) -> bool:
+    def has_attr(self, attr_name: str) -> bool:
         """Whether the batch or one of its wrappers has the attribute."""
-        return hasattr(self._layer_with(name), name)
+        return hasattr(self._layer_with(attr_name), attr_name)
 
     def _get_wrapper_attr(self, name: str, *, indices: VecEnvIndices) -> list[Any]:
         return self.get_attr(name, indices)
+
+    def _has_wrapper_attr(self, name: str) -> bool:
+        return self.has_attr(name)
 
     def _set_wrapper_attr(
         self, name: str, value: Any, *, force: bool = True, indices: VecEnvIndices

@@ -87,6 +87,29 @@ def test_only_ended_episodes_are_reset():
     assert env.unwrapped.engine.steps.tolist()[1] > 0
 
 
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep", "Disabled"])
+def test_the_cost_of_an_episode_is_told_at_its_end_in_every_mode(mode):
+    arguments = {"constraint_mode": "cost", "sigma_rad": 0.06, "max_episode_steps": 30}
+    env = make(2, autoreset_mode=mode, **arguments)
+    single = gymnasium.make(ENV_ID, **arguments)
+    env.reset(seed=0), single.reset(seed=1)
+    total = 0.0
+    for _ in range(30):
+        *_, truncated, told = env.step(np.full((2, 3), [1.0, 0.0, 0.0]))
+        *_, info = single.step(np.array([1.0, 0.0, 0.0]))
+        total += info["cost"]
+        last = told.get("final_info", told)
+        assert info["episode_cost"] == total == last["episode_cost"][1]
+        last["episode_cost"][:] = 99.0  # the callers' own
+    assert truncated.all() and total > 0 and info["cost"] == 1.0
+    if mode == "SameStep":
+        assert told["episode_cost"].tolist() == told["cost"].tolist() == [0.0, 0.0]
+    if mode == "NextStep":
+        *_, told = env.step(np.zeros((2, 3)))
+        assert told["episode_cost"].tolist() == [0.0, 0.0]
+    assert single.reset()[1]["episode_cost"] == 0.0
+
+
 def test_next_step_reset_ignores_the_action_after_an_end():
     env = make(3, max_episode_steps=4)
     assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP

@@ -5,10 +5,16 @@ import doctest
 import gymnasium
 import numpy as np
 import pytest
-from stable_baselines3 import SAC
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.callbacks import EvalCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import (
+    VecCheckNan,
+    VecFrameStack,
+    VecMonitor,
+    VecNormalize,
+)
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvWrapper
 
 from defmanip_gym.errors import ParameterError, StartError
@@ -246,9 +252,68 @@ def test_attributes_and_wrappers_are_those_of_the_batch():
     assert venv.env_is_wrapped(gymnasium.wrappers.vector.ClipReward) == [False, False]
 
 
-def test_other_reset_modes_are_refused():
+def test_methods_and_attributes_of_the_batch_can_be_reached_and_set():
+    inner = batch(2)
+    venv = Sb3VecEnv(gymnasium.wrappers.vector.RecordEpisodeStatistics(inner))
+    for name in ("config", "episode_count", "spec"):  # the batch's, the wrapper's, both have it
+        assert venv.env_method("get_wrapper_attr", name) == venv.get_attr(name)
+        assert venv.env_method("has_wrapper_attr", name, indices=[1]) == [True]
+    assert venv.env_method("has_wrapper_attr", "nothing") == [False, False]
+    with pytest.raises(AttributeError):
+        venv.env_method("get_wrapper_attr", "nothing")
+    venv.set_attr("episode_count", 7)
+    assert venv.env.episode_count == 7
+    venv.env_method("set_wrapper_attr", "max_episode_steps", 9, indices=[0, -1])
+    assert inner.max_episode_steps == 9
+    venv.set_attr("note", "new")
+    assert venv.env.note == "new" and venv.has_attr("note") and not hasattr(inner, "note")
+    assert venv.env_method("set_wrapper_attr", "other", 1, force=False) == [False, False]
+    assert not venv.has_attr("other")
+
+
+def test_spaces_of_an_index_are_those_of_one_episode():
+    venv = make(3)
+    assert venv.get_attr("action_space", [1]) == [venv.action_space]
+    assert venv.get_attr("observation_space") == [venv.observation_space] * 3
+
+
+def test_what_would_change_some_episodes_only_is_refused():
+    venv = make(3)
+    for indices in (0, [0, 1], [-1]):
+        with pytest.raises(ParameterError, match="whole batch"):
+            venv.set_attr("note", 1, indices)
+    for name in ("reset", "step", "close"):
+        with pytest.raises(ParameterError, match="Sb3VecEnv"):
+            venv.env_method(name)
+
+
+def test_frames_are_stacked_and_attributes_found_through_sb3s_wrappers():
+    venv = VecFrameStack(make(2, max_episode_steps=3), n_stack=2)
+    size = venv.venv.observation_space.shape[0]
+    venv.reset()
+    *_, infos = steps(venv, 3)
+    assert infos[0]["terminal_observation"].shape == (2 * size,)
+    assert venv.getattr_depth_check("step_info", already_found=False) is None
+    assert venv.step_info["cost"].shape == (2,)
+    assert venv.env_method("get_wrapper_attr", "max_episode_steps") == [3, 3]
+
+
+def test_eval_callback_evaluates_on_it(tmp_path):
+    model = PPO("MlpPolicy", make(2, max_episode_steps=4), n_steps=8, batch_size=16, n_epochs=1)
+    callback = EvalCallback(
+        make(2, max_episode_steps=4), n_eval_episodes=3, eval_freq=4, log_path=str(tmp_path)
+    )
+    model.learn(16, callback=callback)
+    lengths = np.load(tmp_path / "evaluations.npz")["ep_lengths"]
+    assert lengths.shape == (2, 3) and (lengths == 4).all()
+
+
+def test_other_reset_modes_are_refused_with_what_to_write():
+    for arguments in ({"autoreset_mode": "NextStep"}, {"autoreset_mode": "Disabled"}):
+        with pytest.raises(ParameterError, match="autoreset_mode='SameStep'"):
+            make(**arguments)
     with pytest.raises(ParameterError, match="SAME_STEP"):
-        make(autoreset_mode="NextStep")
+        Sb3VecEnv(gymnasium.make_vec(ENV_ID, num_envs=1))
 
 
 def test_the_example_in_the_documentation_runs():
