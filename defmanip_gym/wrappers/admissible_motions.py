@@ -83,7 +83,7 @@ def moving_motions(
         ),
         axis=-1,
     )
-    pitch_rate: Array = np.linalg.solve(kinematics.jacobian(pitch), rates[..., None])[..., 0]
+    pitch_rate = np.linalg.solve(kinematics.jacobian(pitch), rates[..., None])[..., 0]
     forward = _about_zero(rng, config.task.max_speed_m_s, (count,))
     swing, swing_rate = _swings(config, certificate, count, rng)
     return Motions(
