@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT_SETTINGS = ("PIP_CERT", "PIP_PROXY", "PIP_DEFAULT_TIMEOUT")  # how to reach an index, not which
-LIMIT_S = 110.0
+LIMIT_S = 240.0
 CONNECTION_TROUBLE = re.compile(
     r"Retrying|Connection|timed? ?out|HTTP error|HTTPError|SSLError|Max retries", re.I
 )

@@ -45,7 +45,8 @@ def test_every_script_runs(heading, script):
 
 def test_both_loops_collect_the_transitions_of_the_same_episodes():
     same_step, next_step = ({}, {})
-    for names, (_, script) in zip((same_step, next_step), scripts(), strict=False):
+    loops = [script for heading, script in scripts() if heading == "A plain Gymnasium loop"]
+    for names, script in zip((same_step, next_step), loops, strict=True):
         # all zeros: the two draw actions for different steps
         exec(script.replace("rng.uniform(-1.0, 1.0, ", "np.zeros("), names)
     for part in range(5):
