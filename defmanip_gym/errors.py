@@ -74,6 +74,10 @@ class SeedError(StartError, gymnasium.error.Error):
     """A seed that is not a whole number from zero; Gymnasium's own error as well."""
 
 
+class StateError(InvalidValueError):
+    """A state of episodes that cannot be kept, or does not fit this environment."""
+
+
 class ObjectFileError(InvalidValueError):
     """A model file that cannot be read, or is not an object that certificates are made for."""
 

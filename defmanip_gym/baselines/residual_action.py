@@ -63,6 +63,8 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
         ParameterError: the environment resets in another way, or no whole number of periods.
     """
 
+    remembers = ("_state", "_action")
+
     def __init__(
         self,
         env: gymnasium.vector.VectorEnv[Any, Any, Any],
@@ -182,6 +184,7 @@ class ResidualAction(
     """
 
     vector_wrapper = ResidualVectorAction
+    remembers = ("_state", "_action")
 
     def __init__(
         self,

@@ -6,12 +6,14 @@ import math
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
+from defmanip_gym.envs.episode_access import EpisodeAccess
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
@@ -20,7 +22,7 @@ from defmanip_gym.validation import require_choice, require_seed
 Array = NDArray[np.float64]
 
 
-class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
+class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     """Carry a swinging or flexible beam to a goal without deforming it past σ.
 
     ## Description
@@ -145,7 +147,6 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
-        # copies and pickles are new environments with the same arguments
         gymnasium.utils.EzPickle.__init__(
             self,
             render_mode=render_mode,
@@ -189,9 +190,7 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
             StartError: a start that cannot be taken.
             SeedError: a seed that is not a whole number >= 0.
         """
-        seed = require_seed(seed)
-        observation, _ = self.engine.reset(seeds=[seed], options=options)
-        super().reset(seed=seed)
+        observation, _ = self.engine.reset(seeds=[require_seed(seed)], options=options)
         if self.render_mode == "human":
             self.render()
         return observation[0], self.engine.single_info
@@ -212,6 +211,29 @@ class DeformTransportEnv(gymnasium.Env[Any, Any], gymnasium.utils.EzPickle):
             False,
             self.engine.single_info,
         )
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of the episode as it is now: a copy, with all derived fields."""
+        return self.get_data()
+
+    # Gymnasium's property np_random reads and sets these
+    @property
+    def _np_random(self) -> np.random.Generator:
+        generator: np.random.Generator = self.engine.generators[0]
+        return generator
+
+    @_np_random.setter
+    def _np_random(self, generator: np.random.Generator) -> None:
+        self.engine.draw_from([generator])
+
+    @property
+    def _np_random_seed(self) -> int:
+        return self.engine.generators.seeds[0]
+
+    @_np_random_seed.setter
+    def _np_random_seed(self, seed: int) -> None:
+        """Gymnasium notes -1 with a generator of the user's, as is done with the generator."""
 
     def render(self) -> Any:
         """Return an image, (480, 640, 3) uint8 or depth (480, 640) float32, or show a window.

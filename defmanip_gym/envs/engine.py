@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -15,19 +14,21 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from defmanip_gym.compiled import machine_code
+from defmanip_gym.envs.carried_beams import VARIED, CarriedBeams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.disturbance import disturbing_force
+from defmanip_gym.envs.generators import EpisodeGenerators
 from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score_starts, score_steps
 from defmanip_gym.envs.sensor_noise import SensorNoise
 from defmanip_gym.envs.starts import StartSampler, check_starts, extreme_starts, requested_starts
+from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.envs.survey import goal_of
 from defmanip_gym.envs.task import task_of
 from defmanip_gym.envs.workspace import workspace_of
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.plant.simulation import Simulation
-from defmanip_gym.theory.object_model import HangingBeam, held_forces
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -67,23 +68,14 @@ class TransportEngine:
         )
         self._inner_loop = InnerLoop(config, self.simulation.generalized_forces)
         self.action_size = self._inner_loop.action_size
-        self._generators = [np.random.default_rng(None) for _ in range(num_envs)]
-        self._starts = StartSampler(config.task.start, self._generators)
-        self._noise = SensorNoise(config.disturbance, self.layout, self._generators)
+        self.generators = EpisodeGenerators(num_envs)
+        self._starts = StartSampler(config.task.start, self.generators)
+        self._noise = SensorNoise(config.disturbance, self.layout, self.generators)
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
-        self._beams = np.tile(np.array(_varied(config.beam))[:, None], num_envs)
+        self._beams = CarriedBeams(config, self.simulation, self.generators)
         self._is_started = False
-        self._object = HangingBeam(config.beam)
-        self._held_forces = machine_code(
-            held_forces,
-            self._object.chain.constants,
-            self._object.k_o22,
-            np.empty(1),
-            np.empty(1),
-            np.empty((1, config.beam.segment_count)),
-        )
         self._scores = Scores.empty(num_envs, self.layout.size)
         self._plant = PlantState.empty(num_envs, config.beam.segment_count)
         self._plant_before = self._plant.copy()
@@ -131,7 +123,7 @@ class TransportEngine:
         scores = self._scores
         # a copy: the next step adds to it
         costs = (scores.episode_costs.copy(),)
-        values = chain(scores.told_flags, scores.measures, costs, self._beams.copy())
+        values = chain(scores.told_flags, scores.measures, costs, self._beams.values.copy())
         return dict(zip(_INFO_KEYS, values, strict=True))
 
     @property
@@ -142,7 +134,7 @@ class TransportEngine:
             *scores.told_flags[:, 0].tolist(),
             *scores.measures[:, 0].tolist(),
             scores.episode_costs.item(),
-            *self._beams[:, 0].tolist(),
+            *self._beams.values[:, 0].tolist(),
         )
         return dict(zip(_INFO_KEYS, values, strict=True))
 
@@ -164,7 +156,9 @@ class TransportEngine:
 
         Raises:
             StartError: the requested start cannot be taken.
+            SeedError: a seed that is none.
             ResetNeeded: the first reset leaves episodes out.
+            In all of these cases the running episodes go on as if nothing had been asked.
         """
         ids = self._all if ids is None else ids
         if not self._is_started and len(ids) < self.num_envs:
@@ -173,9 +167,9 @@ class TransportEngine:
         if requested is not None:
             check_starts(requested[ids], self.config)
         if seeds is not None:
-            self._seed(ids, seeds)
+            self._forget(self.generators.seed(ids.tolist(), seeds))
         starts = self._starts.sample(ids) if requested is None else requested[ids]
-        self._carry_beams(ids)
+        self._beams.draw(ids)
         self._place(ids, starts)
         self._steps[ids] = 0
         self._is_started = True
@@ -185,6 +179,55 @@ class TransportEngine:
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
         return self._scores.observations, self.info
+
+    def draw_from(self, generators: Sequence[np.random.Generator]) -> None:
+        """Let the randomness of each episode come from a user's generator from now on.
+
+        Raises:
+            SeedError: no generators, or another number of them.
+        """
+        self.generators.replace(generators)
+        self._forget(range(self.num_envs))
+
+    def get_state(self) -> dict[str, Any]:
+        """Return all that the future of the episodes depends on, arrays (n, ...)."""
+        scores = self._scores
+        return {
+            "is_started": self._is_started,
+            "steps": self._steps.copy(),
+            "generators": self.generators.get_state(),
+            "starts": self._starts.get_state(),
+            "noise": self._noise.get_state(),
+            "beams": self._beams.get_state(),
+            "simulation": self.simulation.get_state(),
+            "plant": self._plant.copy()._asdict(),
+            "observations": scores.observations.copy(),
+            "flags": scores.flags.T.copy(),
+            "numbers": scores.numbers.T.copy(),
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what ``get_state`` returned; of one episode, let all go on from it.
+
+        Raises:
+            StateError: it does not fit; then nothing has changed.
+        """
+        own = self.get_state() | {"beams": None, "noise": None}  # which need not be of this shape
+        state = fitted("state", state, own)
+        beams, noise = self._beams.fitting(state["beams"]), self._noise.fitting(state["noise"])
+        self.generators.set_state(state["generators"])
+        self._beams.set_state(beams)
+        self._starts.set_state(state["starts"])
+        self._noise.set_state(noise)
+        self.simulation.set_state(state["simulation"])
+        self._plant = PlantState(**state["plant"])
+        self._scores = Scores(
+            state["observations"],
+            np.ascontiguousarray(state["flags"].T),
+            np.ascontiguousarray(state["numbers"].T),
+        )
+        self._steps = state["steps"]
+        self._is_started = bool(state["is_started"])
 
     def detach(self) -> None:
         """Go on with a copy of the last results, whatever becomes of those handed out."""
@@ -213,7 +256,7 @@ class TransportEngine:
         self._plant, self._plant_before = self._plant_before, self._plant
         self.simulation.read_into(self._plant, self._all)
         if np.count_nonzero(failed):
-            _freeze(self._plant, self._plant_before, failed)
+            self._plant.freeze(failed, self._plant_before)
         self._scores = Scores.empty(self.num_envs, self.layout.size)
         self._score_steps(
             self._task,
@@ -235,21 +278,11 @@ class TransportEngine:
         if not self._is_started:
             raise ResetNeeded("Call reset() before the first step().")
 
-    def _seed(self, ids: Ids, seeds: Sequence[int | None]) -> None:
-        seeded = {i: seed for i, seed in zip(ids.tolist(), seeds, strict=True) if seed is not None}
-        for index, seed in seeded.items():
-            self._generators[index] = np.random.default_rng(seed)
-        self._starts.forget(np.array(list(seeded), dtype=np.intp))
-
-    def _carry_beams(self, ids: Ids) -> None:
-        """Draw the beams of new episodes, if they are to differ."""
-        ranges = self.config.beam_ranges
-        if ranges.is_empty:
-            return
-        beams = [ranges.sample(self.config.beam, self._generators[i]) for i in ids]
-        self.simulation.carry(ids, beams)
-        self._beams = self._beams.copy()
-        self._beams[:, ids] = np.array([_varied(beam) for beam in beams]).T
+    def _forget(self, ids: Sequence[int]) -> None:
+        """Draw anew for episodes whose generators are others."""
+        forgotten = np.array(ids, dtype=np.intp)
+        self._starts.forget(forgotten)
+        self._noise.restart(forgotten)
 
     def _place(self, ids: Ids, starts: Array) -> None:
         """Put simulations at rest at starts (k, 6), brakes on: the beam may swing, the grasp not.
@@ -259,29 +292,12 @@ class TransportEngine:
         """
         swing = np.repeat(starts[:, 5:], self.config.beam.segment_count, axis=1)
         self.simulation.place(ids, starts[:, :3], starts[:, 3:5], swing)
-        beam, (_, mass_kg, length_m) = self.config.beam, self._beams[:, ids]
-        force_b = self._held_forces(
-            self._object.chain.constants,
-            self._object.k_o22,
-            mass_kg / beam.mass_kg,
-            length_m / beam.length_m,
-            swing,
-        )
-        self.simulation.report(ids, force_b)
+        self.simulation.report(ids, self._beams.forces_at_rest(ids, swing))
 
 
 _INFO_KEYS = (
     *FLAGS,
     *MEASURES,
     "episode_cost",
-    "beam_damping",
-    "beam_mass_kg",
-    "beam_length_m",
+    *(f"beam_{name}" for name in VARIED),
 )
-_varied = attrgetter("damping", "mass_kg", "length_m")
-
-
-def _freeze(plant: PlantState, before: PlantState, failed: BoolArray) -> None:
-    """Let simulations that failed stay as they last were: finite and meaningful."""
-    for values, last in zip(plant, before, strict=True):
-        values[failed] = last[failed]

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.envs.state_tree import fitted
+from defmanip_gym.errors import StateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import DisturbanceParams
 
@@ -39,12 +42,37 @@ class SensorNoise:
         self._deviations = deviations[self._columns]
         self._generators = generators
         count = len(generators)
-        self._drawn = np.empty((count, _STEPS_PER_DRAW, len(self._columns)))
+        self._drawn = np.zeros((count, _STEPS_PER_DRAW, len(self._columns)))
         self._used = np.full(count, _STEPS_PER_DRAW)
 
     def restart(self, ids: Ids) -> None:
         """Forget what was drawn for the episodes that end."""
         self._used[ids] = _STEPS_PER_DRAW
+
+    def get_state(self) -> dict[str, Any]:
+        """Return what has been drawn, and how much of it is used."""
+        return {"drawn": self._drawn.copy(), "used": self._used.copy()}
+
+    def fitting(self, state: Any) -> dict[str, Any]:
+        """Return a state for ``set_state``: what is given, or nothing drawn if sensors differ.
+
+        Raises:
+            StateError: it is of another number of episodes.
+        """
+        own = self.get_state()
+        try:
+            sensors = np.shape(state["drawn"])[1:]
+        except (TypeError, LookupError) as error:
+            raise StateError("state['noise']", state, "a dict", "See get_state.") from error
+        if sensors != own["drawn"].shape[1:]:
+            own["used"][:] = _STEPS_PER_DRAW
+            return own
+        fit: dict[str, Any] = fitted("state['noise']", state, own)
+        return fit
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what ``get_state`` returned."""
+        self._drawn[:], self._used[:] = state["drawn"], state["used"]
 
     def add(self, observations: Array, ids: Ids) -> None:
         """Add one step's noise to the rows ``ids`` of observations (n, size), in place."""

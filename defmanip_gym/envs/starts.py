@@ -69,12 +69,20 @@ class StartSampler:
         self._lowest = np.array(params.center) - np.array(params.spread)
         self._width = 2.0 * np.array(params.spread)
         self._generators = generators
-        self._drawn = np.empty((len(generators), _STARTS_PER_DRAW, 6))
+        self._drawn = np.zeros((len(generators), _STARTS_PER_DRAW, 6))
         self._used = np.full(len(generators), _STARTS_PER_DRAW)
 
     def forget(self, ids: Ids) -> None:
         """Draw anew for these episodes, whose generators have been seeded."""
         self._used[ids] = _STARTS_PER_DRAW
+
+    def get_state(self) -> dict[str, Any]:
+        """Return what has been drawn, and how much of it is used."""
+        return {"drawn": self._drawn.copy(), "used": self._used.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what ``get_state`` returned."""
+        self._drawn[:], self._used[:] = state["drawn"], state["used"]
 
     def sample(self, ids: Ids) -> Array:
         """Return the next start of each of the episodes ``ids``, (k, 6)."""

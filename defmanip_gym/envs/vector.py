@@ -15,12 +15,19 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
+from defmanip_gym.envs.episode_access import EpisodeAccess
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
+from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.validation import MOST_WORKERS, require_choice, require_seeds, require_whole
+from defmanip_gym.validation import (
+    MOST_WORKERS,
+    require_choice,
+    require_seeds,
+    require_whole,
+)
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -28,7 +35,7 @@ BoolArray = NDArray[np.bool_]
 MOST_ENVS = 65_536
 
 
-class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
+class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, Any, Any]):
     """n episodes of :class:`~defmanip_gym.envs.deform_transport.DeformTransportEnv` in one batch.
 
     Everything but the arguments below is as documented there. In ``info`` every key holds an
@@ -84,6 +91,24 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
+        gymnasium.utils.EzPickle.__init__(
+            self,
+            num_envs,
+            max_episode_steps=max_episode_steps,
+            autoreset_mode=autoreset_mode,
+            num_threads=num_threads,
+            render_mode=render_mode,
+            control_mode=control_mode,
+            constraint_mode=constraint_mode,
+            sigma_rad=sigma_rad,
+            robot=robot,
+            beam=beam,
+            beam_ranges=beam_ranges,
+            nominal_robot=nominal_robot,
+            nominal_beam=nominal_beam,
+            task=task,
+            disturbance=disturbance,
+        )
         num_envs = require_whole("num_envs", num_envs, 1, MOST_ENVS)
         max_episode_steps = require_whole("max_episode_steps", max_episode_steps, 1)
         num_threads = require_whole("num_threads", num_threads, 0, MOST_WORKERS)
@@ -167,6 +192,37 @@ class DeformTransportVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             self._ended = np.zeros(self.num_envs, dtype=bool)
         self._keep_results()
         return observation, scores.rewards, scores.terminated, scores.truncated, info
+
+    def get_state(self) -> dict[str, Any]:
+        """Return all that the future of the n episodes depends on."""
+        return super().get_state() | {"ended": self._ended.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from such a state, or all n episodes from that of a single environment.
+
+        Raises:
+            StateError: it is of other beam segments or another number of episodes.
+        """
+        of_one = {"ended": np.zeros(1, dtype=bool)}
+        kept = of_one | dict(state) if isinstance(state, Mapping) else of_one
+        ended = fitted("state['ended']", kept.pop("ended"), self._ended)
+        super().set_state(kept)
+        self._ended = ended
+        self._keep_results()
+
+    @property  # type: ignore[override]
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """The generator of each episode; to be set with n of them."""
+        return tuple(self.engine.generators)
+
+    @np_random.setter  # type: ignore[override]
+    def np_random(self, generators: Sequence[np.random.Generator]) -> None:
+        self.engine.draw_from(generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of each episode's generator; -1 of a user's own."""
+        return self.engine.generators.seeds
 
     def _keep_results(self) -> None:
         """Keep what running episodes were told: a reset of some tells the others again."""

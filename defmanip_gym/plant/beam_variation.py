@@ -69,6 +69,15 @@ class BeamVariation:
         self._write("geom_size", ids, self._geoms, segment.capsule_m)
         self._batch.set_const(ids)
 
+    def move_to(self, plant: batch.Batch) -> None:
+        """Give another batch's simulations, made from the same model, the same beams."""
+        self._batch = plant
+        for field, rows in self._rows.items():
+            self._rows[field] = plant.expand(field)
+            self._rows[field][:] = rows
+        if self._rows:
+            plant.set_const()
+
     def write_to(self, model: mujoco.MjModel, index: int) -> None:
         """Give a copy of the model the beam that simulation ``index`` carries, to draw it."""
         for field, rows in self._rows.items():

@@ -24,16 +24,17 @@ class DivergenceSentinel:
 
     Attributes:
         counter: zero where a simulation has diverged since it was armed, (n,).
+        counters: all of MuJoCo's warning counters, (n, kinds).
     """
 
     def __init__(self, plant: batch.Batch) -> None:
-        self._counters: NDArray[np.int32] = plant.warning[:, :, 1]
-        self.counter: NDArray[np.int32] = self._counters[:, _SENTINEL]
+        self.counters: NDArray[np.int32] = plant.warning[:, :, 1]
+        self.counter: NDArray[np.int32] = self.counters[:, _SENTINEL]
         self.arm(np.arange(plant.nsim))
 
     def arm(self, ids: NDArray[np.intp]) -> None:
         """Watch simulations that have been set to a new state."""
-        self._counters[ids] = 1
+        self.counters[ids] = 1
 
     @property
     def diverged(self) -> NDArray[np.bool_]:

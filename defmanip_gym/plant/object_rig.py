@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from mujoco import batch
 from numpy.typing import NDArray
 
 from defmanip_gym.plant.divergence import DivergenceSentinel
+from defmanip_gym.plant.forks import new_batch
 from defmanip_gym.plant.rig_model import CARRIAGE_JOINTS, RigModel
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class ObjectRig:
         self.rig, self.count = rig, count
         self.timestep_s = float(rig.model.opt.timestep)
         threads = min(count, num_threads or os.cpu_count() or 1)
-        self._batch = batch.Batch(rig.model, count, nthread=threads)
+        self._batch = new_batch(rig.model, count, threads)
         self._sentinel = DivergenceSentinel(self._batch)
         self._position: Array = self._batch.bind("qpos")
         self._velocity: Array = self._batch.bind("qvel")

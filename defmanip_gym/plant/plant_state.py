@@ -54,6 +54,11 @@ class PlantState(NamedTuple):
         """Return a state that keeps its values."""
         return PlantState(*(values.copy() for values in self))
 
+    def freeze(self, failed: NDArray[np.bool_], before: PlantState) -> None:
+        """Let simulations that failed, (n,), stay as they last were: finite and meaningful."""
+        for values, last in zip(self, before, strict=True):
+            values[failed] = last[failed]
+
 
 @compiled
 def read_state(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from math import cos, sin
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,6 +18,7 @@ from defmanip_gym.plant import names
 from defmanip_gym.plant.beam_variation import BeamVariation
 from defmanip_gym.plant.builder import build_model
 from defmanip_gym.plant.divergence import DivergenceSentinel
+from defmanip_gym.plant.forks import new_batch
 from defmanip_gym.plant.plant_state import PlantState, read_state
 
 Array = NDArray[np.float64]
@@ -51,23 +53,16 @@ class Simulation:
         self.model = build_model(
             robot, beam, goal_position_m=goal_position_m, physics_period_s=physics_period_s
         )
-        threads = min(count, num_threads or os.cpu_count() or 1)
-        self._batch = batch.Batch(self.model, count, nthread=threads)
+        self.count = count
+        self._threads = min(count, num_threads or os.cpu_count() or 1)
+        self._bind(new_batch(self.model, count, self._threads))
         self._pristine = self._batch.state[0].copy()
         self._variation = BeamVariation(self._batch, beam)
-        self._position: Array = self._batch.bind("qpos")
-        self._velocity: Array = self._batch.bind("qvel")
-        control: Array = self._batch.bind("ctrl")
-        self._control = control[:, : len(names.ACTUATORS)]
-        self._lateral_target = control[:, self.model.actuator(names.NO_SLIP).id]
-        self._external: Array = self._batch.bind("xfrc_applied")
-        self._sensed_force: Array = self._batch.bind("sensordata")
         self._grasp_force_s = np.zeros((count, 3))
         self._readings = np.zeros((count, 1, 3))
         self._forearm = self.model.body(names.FOREARM).id
         self._forearm_com_m = float(self.model.body(names.FOREARM).ipos[0])
         self._forearm_length_m = robot.forearm.length_m
-        self._sentinel = DivergenceSentinel(self._batch)
         self._segments, self._period_s = beam.segment_count, float(physics_period_s)
         self._all = np.arange(count)
         self._read = machine_code(
@@ -89,7 +84,41 @@ class Simulation:
             self._sentinel.counter,
             np.zeros(count, dtype=np.bool_),
         )
-        self.count = count
+
+    def _bind(self, plant: batch.Batch) -> None:
+        """Look at the fields of a batch from now on."""
+        self._batch, self._process = plant, os.getpid()
+        self._position: Array = plant.bind("qpos")
+        self._velocity: Array = plant.bind("qvel")
+        control: Array = plant.bind("ctrl")
+        self._control = control[:, : len(names.ACTUATORS)]
+        self._lateral_target = control[:, self.model.actuator(names.NO_SLIP).id]
+        self._external: Array = plant.bind("xfrc_applied")
+        self._sensed_force: Array = plant.bind("sensordata")
+        self._sentinel = DivergenceSentinel(plant)
+
+    def _require_threads(self) -> None:
+        """Make the batch anew in a forked child, which has none of the threads that step it."""
+        if self._process == os.getpid():
+            return
+        state = self.get_state()
+        self._bind(new_batch(self.model, self.count, self._threads))
+        self._variation.move_to(self._batch)
+        self.set_state(state)
+
+    def get_state(self) -> dict[str, Any]:
+        """Return what the simulations' future depends on beside their beams, arrays (n, ...)."""
+        return {
+            "physics": self._batch.state.copy(),
+            "warnings": self._sentinel.counters.copy(),
+            "grasp_force_s": self._grasp_force_s.copy(),
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what ``get_state`` returned for simulations of the same beams."""
+        self._batch.state[:] = state["physics"]
+        self._sentinel.counters[:] = state["warnings"]
+        self._grasp_force_s[:] = state["grasp_force_s"]
 
     def read(self) -> PlantState:
         """Return the current state and the grasp force at this instant."""
@@ -107,6 +136,7 @@ class Simulation:
         Raises:
             ParameterError: beams that differ in more than damping, mass and length.
         """
+        self._require_threads()
         self._variation.set(ids, beams)
 
     def place(self, ids: NDArray[np.intp], pose: Array, joints: Array, swing: Array) -> None:
@@ -142,6 +172,7 @@ class Simulation:
 
     def hold(self, ids: NDArray[np.intp], generalized_forces: Array) -> None:
         """Set T_r of simulations, (k, 4), and compute the forces it causes, without stepping."""
+        self._require_threads()
         self._control[ids] = generalized_forces
         self._batch.forward(ids)
         self._grasp_force_s[ids] = self._sensed_force[ids]
@@ -165,6 +196,7 @@ class Simulation:
 
         A simulation that diverged holds a meaningless state until it is placed again.
         """
+        self._require_threads()
         self._lead(self._position, self._velocity, self._period_s, self._lateral_target)
         if self._readings.shape[1] != substeps:
             self._readings = np.empty((self.count, substeps, 3))

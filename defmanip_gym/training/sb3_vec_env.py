@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvStepReturn
 
+from defmanip_gym.envs.state import get_state, set_state, wrappers
 from defmanip_gym.errors import ParameterError, StartError
 
 Array = NDArray[np.float64]
@@ -138,20 +139,20 @@ class Sb3VecEnv(VecEnv):
         return endings
 
     def get_state(self) -> dict[str, Any] | None:
-        """Return what the running episodes' future depends on; None where the batch cannot tell.
+        """Return what the running episodes' future depends on; None where they cannot go on.
 
-        So it is before the first reset, too.
+        So it is before the first reset, and where a wrapper does not name what it remembers.
         """
         is_fresh = any(seed is not None for seed in self._seeds)
-        if is_fresh or not hasattr(self.env, "get_state"):
+        if is_fresh or not all(hasattr(type(layer), "remembers") for layer in wrappers(self.env)):
             return None
-        tallies = [tally.copy() for tally in (self._returns, self._lengths, self._costs)]
-        return {"tallies": tallies, "batch": self.env.get_state()}
+        tallies = [self._returns.copy(), self._lengths.copy()]
+        return {"tallies": tallies, "batch": get_state(self.env)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what ``get_state`` returned."""
-        self._returns, self._lengths, self._costs = state["tallies"]
-        self.env.set_state(state["batch"])  # type: ignore[attr-defined]
+        self._returns, self._lengths = state["tallies"]
+        set_state(self.env, state["batch"])
         self._reset_seeds()
         self._reset_options()
 

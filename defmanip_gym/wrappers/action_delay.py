@@ -34,6 +34,8 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
         ParameterError: periods that are not a whole number.
     """
 
+    remembers = ("_under_way", "_ended", "_is_started")
+
     def __init__(self, env: gymnasium.vector.VectorEnv[Any, Any, Any], periods: int) -> None:
         periods = require_whole("periods", periods, 0, _MOST_PERIODS)
         super().__init__(env)

@@ -28,24 +28,28 @@ class ActionScaling:
     Args:
         config: the environment's definition.
         certificate: the bounds to enforce.
+        count: n.
         action_changers: wrappers between here and the environment that may change actions.
 
     Raises:
         CertificateError: the certificate does not fit the environment.
     """
 
+    remembers = ("_motion", "_applicability", "steps", "interventions", "total_intervention_m_s2")
+
     def __init__(
         self,
         config: TransportConfig,
         certificate: Certificate,
+        count: int = 1,
         action_changers: tuple[str, ...] = (),
     ) -> None:
         certificate = require_params("certificate", certificate, Certificate)
         require_fit(config, certificate)
-        self._config, self._certificate = config, certificate
+        self._config = config
         self._layout = ObservationLayout(config.beam.segment_count)
-        self._applicability = Applicability(config, certificate, action_changers)
-        self._motion: CertifiedMotion
+        self._applicability = Applicability(config, certificate, count, action_changers)
+        self._motion = CertifiedMotion(config, certificate, count)
         self.steps = 0
         self.interventions = 0
         self.total_intervention_m_s2 = 0.0
@@ -67,8 +71,6 @@ class ActionScaling:
             observation: first observations, (n, size); rows that do not start are not looked at.
             started: which episodes start, (n,).
         """
-        if not hasattr(self, "_motion"):
-            self._motion = CertifiedMotion(self._config, self._certificate, len(started))
         motion = GraspMotion.observed(self._layout, observation)
         self._motion.begin(started)
         self._applicability.begin(self._layout.part(observation, "swing"), motion, started)

@@ -60,20 +60,40 @@ class Applicability:
     Args:
         config: the environment's definition.
         certificate: that is enforced.
+        count: n.
         action_changers: names of wrappers that may change the certified actions.
+
+    Attributes:
+        reasons: why the certificate does not cover the episodes, in words, (n,); empty where it
+            does as far as is known by now.
     """
 
+    remembers = ("words",)
+
     def __init__(
-        self, config: TransportConfig, certificate: Certificate, action_changers: tuple[str, ...]
+        self,
+        config: TransportConfig,
+        certificate: Certificate,
+        count: int = 1,
+        action_changers: tuple[str, ...] = (),
     ) -> None:
         self._config, self._certificate = config, certificate
         self._action_changers = action_changers
-        self.reasons = np.empty(0, dtype=object)
+        self.reasons = np.full(count, "", dtype=object)
 
     @property
     def applies(self) -> BoolArray:
         """Whether the certificate covers the episodes as far as is known by now, (n,)."""
         return self.reasons == ""
+
+    @property
+    def words(self) -> list[str]:
+        """The same as a list."""
+        return list(self.reasons)
+
+    @words.setter
+    def words(self, words: list[str]) -> None:
+        self.reasons = np.array(words, dtype=object)
 
     def begin(self, swing: Array, motion: GraspMotion, started: BoolArray) -> None:
         """Judge episodes at their start.
@@ -83,8 +103,6 @@ class Applicability:
             motion: of the grasp.
             started: which episodes start, (n,).
         """
-        if len(self.reasons) != len(started):
-            self.reasons = np.full(len(started), "", dtype=object)
         self.reasons[started] = self.configuration_reason
         for i in np.flatnonzero(started & self.applies):
             self.reasons[i] = self._start_reason(np.abs(swing[i]).max(), motion.joints[i])

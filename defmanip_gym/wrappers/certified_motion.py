@@ -68,6 +68,8 @@ class CertifiedMotion:
         count: n.
     """
 
+    remembers = ("excess",)
+
     def __init__(self, config: TransportConfig, certificate: Certificate, count: int) -> None:
         self._task, self._certificate = config.task, certificate
         self._kinematics = ArmKinematics(config.robot)

@@ -39,10 +39,14 @@ class NuMaxActionScaling(
         CertificateError: the certificate does not fit the environment.
     """
 
+    remembers = ("_observation", "scaling")
+
     def __init__(self, env: gymnasium.Env[Array, Array], certificate: Certificate) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self, certificate=plain(certificate))
         super().__init__(env)
-        self.scaling = ActionScaling(transport_config(env), certificate, action_changers(env))
+        self.scaling = ActionScaling(
+            transport_config(env), certificate, action_changers=action_changers(env)
+        )
         self._observation: Array | None = None
 
     def reset(
@@ -85,11 +89,15 @@ class NuMaxVectorActionScaling(gymnasium.vector.VectorWrapper[Any, Any, Any, Any
         CertificateError: the certificate does not fit the environment.
     """
 
+    remembers = ("_observation", "_ended", "scaling")
+
     def __init__(
         self, env: gymnasium.vector.VectorEnv[Any, Any, Any], certificate: Certificate
     ) -> None:
         super().__init__(env)
-        self.scaling = ActionScaling(transport_config(env), certificate, action_changers(env))
+        self.scaling = ActionScaling(
+            transport_config(env), certificate, env.num_envs, action_changers(env)
+        )
         self._observation: Array | None = None
         self._ended = np.zeros(env.num_envs, dtype=bool)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import gymnasium
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.state import wrappers
 from defmanip_gym.errors import ActionError, CertificateError
 from defmanip_gym.validation import number_array
 
@@ -46,7 +46,7 @@ def transport_config(env: Any) -> TransportConfig:
     Raises:
         CertificateError: it is another kind of environment.
     """
-    for layer in _wrappers(env):
+    for layer in wrappers(env):
         if isinstance(layer, _OBSERVATION_WRAPPERS):
             raise CertificateError(
                 "env",
@@ -68,7 +68,7 @@ def action_changers(env: Any) -> tuple[str, ...]:
     Those are all but Gymnasium's that do not, wrappers without a ``step`` of their own, and those
     that say so by an attribute ``keeps_actions`` that is true.
     """
-    return tuple(type(layer).__name__ for layer in _wrappers(env) if not _keeps_actions(layer))
+    return tuple(type(layer).__name__ for layer in wrappers(env) if not _keeps_actions(layer))
 
 
 def _keeps_actions(layer: Any) -> bool:
@@ -79,13 +79,6 @@ def _keeps_actions(layer: Any) -> bool:
         return False
     is_known = kind.__name__ in _KEEPING.get(kind.__module__, ())
     return is_known or kind.step in _STEPS
-
-
-def _wrappers(env: Any) -> Iterator[Any]:
-    layer = env
-    while layer is not env.unwrapped:
-        yield layer
-        layer = layer.env
 
 
 def finite_actions(actions: Any, awake: BoolArray, shape: tuple[int, ...] = (3,)) -> Array:

@@ -86,6 +86,6 @@ def test_wild_commands_stay_within_the_room_and_need_it(make_batch):
 
 def test_what_is_not_provided_for_exceeds_the_room(make_batch):
     condition = Condition(name="x", disturbance=STRONG)
-    reason = Applicability(condition.environment, CERTIFICATE, ()).configuration_reason
+    reason = Applicability(condition.environment, CERTIFICATE).configuration_reason
     assert "provides for" in reason or "has room for" in reason
     assert surprises(condition, make_batch)[0][..., 0].max() > FORWARD_ROOM

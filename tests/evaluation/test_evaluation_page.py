@@ -34,7 +34,8 @@ def row(suite, condition):
     factors = (condition.damping_factor, condition.mass_factor, condition.length_factor)
     certificate = CERTIFICATES.named(CERTIFICATE_OPTION)
     delayed = ("ActionDelay",) if condition.delay_periods else ()
-    covered = not Applicability(condition.environment, certificate, delayed).configuration_reason
+    judge = Applicability(condition.environment, certificate, action_changers=delayed)
+    covered = not judge.configuration_reason
     cells = (
         suite.name,
         f"`{condition.name}`",

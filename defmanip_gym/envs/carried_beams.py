@@ -1,0 +1,109 @@
+"""The beams of n episodes: drawn anew for each, if they are to differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defmanip_gym.compiled import machine_code
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.state_tree import fitted
+from defmanip_gym.params import BeamParams
+from defmanip_gym.plant.simulation import Simulation
+from defmanip_gym.theory.object_model import HangingBeam, held_forces
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.intp]
+
+VARIED = ("damping", "mass_kg", "length_m")
+
+
+class CarriedBeams:
+    """What the simulations carry.
+
+    Args:
+        config: the environment's definition, with the ranges to draw from.
+        simulation: of the n episodes; its beams follow the draws.
+        generators: one for each episode, looked up anew at every draw.
+
+    Attributes:
+        values: ``VARIED`` of each episode's beam, (3, n); replaced, never written.
+    """
+
+    def __init__(
+        self,
+        config: TransportConfig,
+        simulation: Simulation,
+        generators: Sequence[np.random.Generator],
+    ) -> None:
+        self._beam, self._ranges = config.beam, config.beam_ranges
+        self._simulation, self._generators = simulation, generators
+        count = simulation.count
+        self._all = np.arange(count)
+        self.values: Array = np.tile(_rows([config.beam]).T, count)
+        self._object = HangingBeam(config.beam)
+        self._held_forces = machine_code(
+            held_forces,
+            self._object.chain.constants,
+            self._object.k_o22,
+            np.empty(1),
+            np.empty(1),
+            np.empty((1, config.beam.segment_count)),
+        )
+
+    def draw(self, ids: Ids) -> None:
+        """Let new episodes, (k,) increasing, have beams of their own."""
+        if self._ranges.is_empty:
+            return
+        self._carry(ids, [self._ranges.sample(self._beam, self._generators[i]) for i in ids])
+
+    def forces_at_rest(self, ids: Ids, swing: Array) -> Array:
+        """Return the force on beams that swing from a grasp at rest, base frame, (k, 3) N.
+
+        Args:
+            ids: the episodes, (k,).
+            swing: of their segments, (k, N) rad.
+        """
+        _, mass_kg, length_m = self.values[:, ids]
+        force_b: Array = self._held_forces(
+            self._object.chain.constants,
+            self._object.k_o22,
+            mass_kg / self._beam.mass_kg,
+            length_m / self._beam.length_m,
+            swing,
+        )
+        return force_b
+
+    def get_state(self) -> Array | None:
+        """Return the drawn beams' values, (n, 3), or None where none are drawn."""
+        return None if self._ranges.is_empty else self.values.T.copy()
+
+    def fitting(self, state: Any) -> list[BeamParams] | None:
+        """Return the beams of a state, n, or None where it has none.
+
+        Raises:
+            StateError: it is of another number of episodes.
+            ParameterError: it holds values that no beam has.
+        """
+        if state is None:
+            return None
+        rows = fitted("state['beams']", state, self.values.T)
+        return [replace(self._beam, **dict(zip(VARIED, row, strict=True))) for row in rows.tolist()]
+
+    def set_state(self, beams: list[BeamParams] | None) -> None:
+        """Carry what ``fitting`` returned; what is carried now where it is None."""
+        if beams is not None:
+            self._carry(self._all, beams)
+
+    def _carry(self, ids: Ids, beams: list[BeamParams]) -> None:
+        self._simulation.carry(ids, beams)
+        self.values = self.values.copy()
+        self.values[:, ids] = _rows(beams).T
+
+
+def _rows(beams: Sequence[BeamParams]) -> Array:
+    return np.array([[getattr(beam, name) for name in VARIED] for beam in beams])
