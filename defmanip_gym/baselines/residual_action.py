@@ -22,7 +22,7 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 from defmanip_gym.validation import require_positive
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling, NuMaxVectorActionScaling
-from defmanip_gym.wrappers.transport import transport_config
+from defmanip_gym.wrappers.transport import finite_actions, transport_config
 
 if TYPE_CHECKING:
     from defmanip_gym.envs.vector import DeformTransportVectorEnv
@@ -109,7 +109,13 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
     def step(
         self, actions: Array
     ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Step with the corrected actions for the time of a decision."""
+        """Step with the corrected actions for the time of a decision.
+
+        Raises:
+            ActionError: actions that are not finite or of another shape.
+            ResetNeeded: no episode has been started.
+        """
+        actions = finite_actions(actions, np.ones(self.num_envs, dtype=bool))
         rewards, cost = np.zeros((2, self.num_envs))
         terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)
         last: dict[str, Any] = {}
@@ -222,13 +228,19 @@ class ResidualAction(
         return observation, info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Step with the corrected action for the time of a decision, or until the end."""
+        """Step with the corrected action for the time of a decision, or until the end.
+
+        Raises:
+            ActionError: an action that is not finite or of another shape.
+            ResetNeeded: no episode has been started.
+        """
         if self._action is None:
             raise ResetNeeded("Call reset() before the first step().")
+        (residual,) = finite_actions([action], np.array([True]))
         total, cost = 0.0, 0.0
         for _ in range(self._decision_periods):
             observation, reward, terminated, truncated, info = self.env.step(
-                corrected(self._action, action, self._authority)
+                corrected(self._action, residual, self._authority)
             )
             self._action, self._state = self._base.predict(observation, self._state)
             total, cost = total + float(reward), cost + info["cost"]
