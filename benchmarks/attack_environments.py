@@ -37,7 +37,7 @@ from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 Rng = np.random.Generator
 Attacker = Callable[[np.ndarray, np.ndarray, int, Rng], np.ndarray]
 
-EPISODES = 50  # of a case, shared by the attackers
+EPISODES = 100  # of a case, shared by the attackers
 
 
 def drawn_environment(rng: Rng) -> dict[str, Any]:

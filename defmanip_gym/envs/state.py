@@ -8,7 +8,14 @@ from typing import Any
 
 from defmanip_gym.errors import StateError
 
-_OF_THE_ENVIRONMENT = ("env", "_action_space", "_observation_space", "_metadata", "_cached_spec")
+_OF_THE_ENVIRONMENT = {
+    "_action_space",
+    "_observation_space",
+    "_single_action_space",
+    "_single_observation_space",
+    "_metadata",
+    "_cached_spec",
+}
 
 
 def get_state(env: Any) -> dict[str, Any]:
@@ -85,7 +92,7 @@ def _episodes(env: Any) -> Any:
 def _remembered(thing: Any, env: Any) -> dict[str, Any]:
     """Return copies of what a wrapper, or a part of one, has noted."""
     memory = {}
-    for name in _noted(thing):
+    for name in _noted(thing, env):
         value = getattr(thing, name)
         is_part = hasattr(type(value), "remembers")
         memory[name] = _remembered(value, env) if is_part else _copied(thing, value, env)
@@ -101,16 +108,25 @@ def _remember(thing: Any, memory: Mapping[str, Any], env: Any) -> None:
             setattr(thing, name, _copied(thing, kept, env))
 
 
-def _noted(thing: Any) -> list[str]:
+def _noted(thing: Any, env: Any) -> list[str]:
     named = getattr(type(thing), "remembers", None)
     if named is not None:
         return list(named)
-    return [name for name in vars(thing) if name not in _OF_THE_ENVIRONMENT]
+    layers = _layers(env)
+    return [
+        name
+        for name, value in vars(thing).items()
+        if name not in _OF_THE_ENVIRONMENT and id(value) not in layers
+    ]
+
+
+def _layers(env: Any) -> dict[int, Any]:
+    return {id(layer): layer for layer in (*wrappers(env), env.unwrapped)}
 
 
 def _copied(thing: Any, value: Any, env: Any) -> Any:
     """Return a copy that refers to the same environment and wrappers, where it does so."""
-    memo = {id(layer): layer for layer in (*wrappers(env), env.unwrapped)}
+    memo = _layers(env)
     try:
         return copy.deepcopy(value, memo)
     except Exception as error:  # whatever locks, windows and files raise

@@ -31,6 +31,9 @@ class Course:
         power: mean square in each window, (W, 15).
         opening_time_s: (S,).
         opening: (S, 15).
+        largest_velocity_m_s: largest |velocity| on each axis of the base frame, (3,), at any sample
+            of the force loop: those above are of the slower outer loop.
+        largest_swing_rad: likewise max |φ|, (1,).
     """
 
     time_s: Array
@@ -40,15 +43,13 @@ class Course:
     power: Array
     opening_time_s: Array
     opening: Array
+    largest_velocity_m_s: Array
+    largest_swing_rad: Array
 
     @property
     def arrays(self) -> dict[str, Array]:
         """The fields by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    def largest(self, columns: slice) -> float:
-        """Return the largest absolute value that any sample had in these columns."""
-        return float(max(-self.low[:, columns].min(), self.high[:, columns].max()))
 
 
 class CourseRecorder:
@@ -59,6 +60,12 @@ class CourseRecorder:
         self._rows: list[tuple[float, Array]] = []
         self._opening: list[tuple[float, Array]] = []
         self._end_s = WINDOW_S
+        self._largest_velocity, self._largest_swing = np.zeros(3), np.zeros(1)
+
+    def note_extremes(self, velocity_b: Array, swing: Array) -> None:
+        """Keep the largest of what the force loop saw, (k, 3) m/s and (k, 1) rad."""
+        self._largest_velocity = np.maximum(self._largest_velocity, np.abs(velocity_b).max(axis=0))
+        self._largest_swing = np.maximum(self._largest_swing, np.abs(swing).max(axis=0))
 
     def add(self, time_s: float, sample: Array) -> Array | None:
         """Keep a sample; where it completes a window, return the window, (samples, 15)."""
@@ -88,4 +95,6 @@ class CourseRecorder:
             power=values[:, 3],
             opening_time_s=np.array([time for time, _ in self._opening]),
             opening=np.array([sample for _, sample in self._opening]),
+            largest_velocity_m_s=self._largest_velocity,
+            largest_swing_rad=self._largest_swing,
         )

@@ -16,7 +16,7 @@ from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import Scenario
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
-from defmanip_gym.reproduction.course import POSITION, SWING
+from defmanip_gym.reproduction.course import POSITION
 from defmanip_gym.reproduction.parts import Numbers, Part
 from defmanip_gym.reproduction.setting import PLANT_DAMPING, SIGMA_RAD, paper_setting
 from defmanip_gym.reproduction.transport import run_transport
@@ -167,7 +167,7 @@ def physics_step_study(max_duration_s: float) -> Part:
                 "physics_period_s": physics_period_s,
                 "duration_s": float(course.time_s[-1]),
                 "position_m": course.last[-1, POSITION].tolist(),
-                "largest_swing_rad": course.largest(SWING),
+                "largest_swing_rad": float(course.largest_swing_rad[0]),
             }
         )
     positions = np.array([row["position_m"] for row in rows])

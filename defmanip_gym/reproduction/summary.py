@@ -13,6 +13,7 @@ from defmanip_gym.reproduction.course import (
     POSITION,
     SWING,
     VELOCITY,
+    WINDOW_S,
     Course,
 )
 from defmanip_gym.reproduction.parts import Numbers
@@ -42,9 +43,12 @@ def summarize(setting: PaperSetting, course: Course) -> Numbers:
         "smallest_k2_prop_v1": smallest_k2(setting.tracking_gain),
         "duration_s": float(course.time_s[-1]),
         "converged": _distance(last) < _GOAL_RADIUS_M,
-        "largest_swing_rad": course.largest(SWING),
+        "largest_swing_rad": float(course.largest_swing_rad[0]),
         "sigma_rad": setting.environment.sigma_rad,
-        "largest_velocity_m_s": [course.largest(axis) for axis in _axes(VELOCITY)],
+        "largest_velocity_m_s": course.largest_velocity_m_s.tolist(),
+        "arrival_m": setting.arrival_m,
+        "arrival_speed_m_s": setting.arrival_speed_m_s,
+        "arrival_window_s": WINDOW_S,
         "final_position_m": last[POSITION].tolist(),
         "final_distance_m": _distance(last),
         "final_speed_m_s": float(np.linalg.norm(last[VELOCITY])),
@@ -108,10 +112,6 @@ def _force_error(course: Course) -> Numbers:
         "largest_after_1_s_m_s2": np.abs(rest).max(axis=0).tolist(),
         "final_rms_m_s2": np.sqrt(course.power[-1, FORCE_ERROR]).tolist(),
     }
-
-
-def _axes(columns: slice) -> list[slice]:
-    return [slice(index, index + 1) for index in range(columns.start, columns.stop)]
 
 
 def _distance(sample: Array) -> float:

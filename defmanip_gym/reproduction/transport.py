@@ -68,6 +68,7 @@ class PaperLoop:
         self._force_error = np.zeros((1, 3))
         self._place()
         self._midway = self._simulation.read()
+        self._seen = [self._midway]
         self.time_s = 0.0
 
     def enter(self, stage: LoopStage) -> None:
@@ -86,6 +87,7 @@ class PaperLoop:
         error_model = local_model(self._error_function, _error_inputs(self._midway, u_o)[0])
         inputs = _force_inputs(np.zeros((1, 3)), plant)[0]
         force_model = local_model(self._force_function, inputs)
+        self._seen = [plant]
         for _ in range(self._stage.samples_per_update):
             self._feed_back(u_o, error_model, force_model)
         columns = (
@@ -97,6 +99,15 @@ class PaperLoop:
             self._force_error,
         )
         return np.concatenate(columns, axis=1)[0]
+
+    def seen(self) -> tuple[Array, Array]:
+        """Return grasp velocity, (k, 3) m/s, and swing, (k, 1) rad, since the last ``advance``.
+
+        In the middle of each of the k - 1 sampling periods, and at the instant before them.
+        """
+        seen = PlantState(*(np.concatenate(values) for values in zip(*self._seen, strict=True)))
+        observation = clean_observations(self._config, seen)
+        return self._layout.part(observation, "grasp_velocity_b"), seen.swing
 
     def _feed_back(self, u_o: Array, error_model: LocalModel, force_model: LocalModel) -> None:
         """Run the force loop and the plant for one sampling period."""
@@ -112,6 +123,7 @@ class PaperLoop:
         substeps = round(self._stage.period_s / self._physics_period_s)
         failed = self._simulation.step(substeps // 2)
         self._midway = self._simulation.read()
+        self._seen.append(self._midway)
         if (failed | self._simulation.step(substeps - substeps // 2)).any():
             raise DivergenceError(
                 "time_s", self.time_s, "a simulation that does not diverge", "Shorten the periods."
@@ -178,6 +190,7 @@ def run_transport(setting: PaperSetting, on_progress: Callable[[float], None]) -
         end_s = min(stage.end_s, setting.max_duration_s)
         while loop.time_s < end_s - 1e-6:
             window = recorder.add(loop.time_s, loop.advance())
+            recorder.note_extremes(*loop.seen())
             if window is not None:
                 on_progress(loop.time_s)
                 if has_arrived(window, setting):

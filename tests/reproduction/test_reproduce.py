@@ -14,7 +14,10 @@ from defmanip_gym.reproduction import reproduce
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.reproduction.page import render_page
 from defmanip_gym.reproduction.reproduce import run_reproduction
-from defmanip_gym.reproduction.setting import paper_nu_max
+from defmanip_gym.reproduction.setting import paper_nu_max, paper_setting
+from defmanip_gym.reproduction.studies import STUDIES
+from defmanip_gym.reproduction.summary import summarize
+from defmanip_gym.reproduction.transport import run_transport
 
 DOCS = Path(__file__).parents[2] / "docs"
 FIGURES = ("figure_2", "figure_3", "figure_4", "figure_5", "damping_study", "l1")
@@ -129,6 +132,34 @@ def test_the_page_in_docs_shows_its_numbers_and_images():
     images = re.findall(r"\]\(([^)]+\.png)\)", page)
     assert images == [f"{folder}{name}.png" for name in FIGURES]
     assert all((DOCS / image).stat().st_size > 1000 for image in images)
+
+
+def same(found, expected):
+    """Whether numbers are the same but for what another processor's rounding makes of them."""
+    if isinstance(expected, dict):
+        return set(found) == set(expected) and all(same(found[k], expected[k]) for k in expected)
+    if isinstance(expected, list):
+        return len(found) == len(expected) and all(map(same, found, expected))
+    if isinstance(expected, float):
+        return found == pytest.approx(expected, rel=1e-4, abs=1e-9)
+    return found == expected
+
+
+def test_the_page_in_docs_is_what_the_command_makes_today():
+    numbers = json.loads((DOCS / "images/reproduction/numbers.json").read_text())
+    for name in ("l1", "damping_study"):
+        assert same(STUDIES[name](100.0).numbers, numbers[name])
+    setting = paper_setting(max_duration_s=10.0)  # of nine hours: settings, and the opening
+    found, expected = (
+        summarize(setting, run_transport(setting, lambda _: None)),
+        numbers["transport"],
+    )
+    assert found.keys() == expected.keys()
+    whole = {"duration_s", "converged", "largest_velocity_m_s"}
+    for key in found.keys() - {key for key in found if key.startswith("final_")} - whole:
+        if key == "force_error":
+            found[key]["final_rms_m_s2"] = expected[key]["final_rms_m_s2"]
+        assert same(found[key], expected[key]), key
 
 
 def test_the_page_in_docs_is_of_a_full_run():
