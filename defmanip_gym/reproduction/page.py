@@ -32,7 +32,7 @@ def render_page(numbers: Numbers, *, image_folder: str = "") -> str:
     environment.filters |= {
         "fixed": lambda value, digits: f"{value:.{digits}f}".replace("-", "−"),
         "short": _short,
-        "scientific": lambda value, digits=1: f"{value:.{digits}e}".replace("e-0", "e-"),
+        "scientific": _scientific,
         "degrees": math.degrees,
     }
     template = environment.get_template("reproduction.md.j2")
@@ -46,6 +46,11 @@ def write_page(folder: Path, numbers: Numbers) -> Path:
     page = folder / "reproduction.md"
     write_atomically(page, render_page(numbers).encode("utf-8"))
     return page
+
+
+def _scientific(value: float, digits: int = 1) -> str:
+    sign = "−" if value < 0 else ""
+    return sign + f"{abs(value):.{digits}e}".replace("e-0", "e-")
 
 
 def _short(value: float) -> str:
