@@ -7,6 +7,7 @@ from hypothesis import settings
 
 import defmanip_gym  # noqa: F401
 from defmanip_gym.envs.graphics import GRAPHICS
+from defmanip_gym.envs.opengl import open_context
 from defmanip_gym.errors import RenderingError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant.simulation import Simulation
@@ -19,7 +20,7 @@ settings.load_profile("repeatable")
 def opengl():
     """Skip tests that draw where no OpenGL can be had."""
     try:
-        GRAPHICS.run(lambda: None)
+        GRAPHICS.run(lambda: open_context().free())
     except RenderingError as error:
         pytest.skip(str(error))
 

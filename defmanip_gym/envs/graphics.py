@@ -1,16 +1,16 @@
-"""The thread that draws all off-screen images of a process, in the one OpenGL context that it has.
+"""The thread that draws all off-screen images of a process.
 
-What OpenGL draws, reads and frees belongs to whichever context is current in the calling thread.
-With a context for each environment, drawing one uses another's, closing one leaves none current,
-and a discarded :class:`mujoco.MjrContext` deletes textures and buffers of a stranger. Here a single
-context is current for good, in a thread of its own: it does not matter which thread asks for an
-image, and contexts of others, such as Gymnasium's own environments, are left as they are.
+What OpenGL draws, reads and frees belongs to whichever context is current in the calling thread:
+closing one environment leaves none current for the next, and discarding a
+:class:`mujoco.MjrContext` deletes textures and buffers of a stranger. Here contexts are made, used
+and freed by one thread that does nothing else, and each is made current before it is used. So it
+does not matter which thread asks for an image, and contexts of others, such as Gymnasium's own
+environments, stay current in theirs.
 """
 
 from __future__ import annotations
 
 import atexit
-import importlib
 import os
 import sys
 import threading
@@ -23,17 +23,6 @@ from defmanip_gym.errors import RenderingError
 
 Result = TypeVar("Result")
 
-# MUJOCO_GL, as MuJoCo reads it
-_MODULES = {
-    "egl": "mujoco.egl",
-    "osmesa": "mujoco.osmesa",
-    "cgl": "mujoco.cgl",
-    "glfw": "mujoco.glfw",
-    "glx": "mujoco.glfw",
-    "wgl": "mujoco.glfw",
-}
-_SWITCHED_OFF = ("disable", "disabled", "off", "false", "0")
-
 
 class GraphicsThread:
     """Runs whatever calls OpenGL, one piece of work after the other; starts with the first."""
@@ -43,8 +32,7 @@ class GraphicsThread:
         self._tasks: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = SimpleQueue()
         self._starting = threading.Lock()
         self._thread: threading.Thread | None = None
-        self._context: Any = None
-        self._is_forked = self._has_ended = False
+        self._is_forked = self._has_ended = self._is_registered = False
         if hasattr(os, "register_at_fork"):
             os.register_at_fork(after_in_child=self._note_fork)
 
@@ -52,7 +40,7 @@ class GraphicsThread:
         """Return what ``work`` returns, or raise what it raises.
 
         Raises:
-            RenderingError: the machine offers no OpenGL, or not to this process.
+            RenderingError: OpenGL is not to be had by this process any more.
         """
         if self._is_forked:
             raise RenderingError(
@@ -64,7 +52,7 @@ class GraphicsThread:
             raise RenderingError("Cannot render: Python is ending. Render before it does.")
         self._start()
         future: Future[Result] = Future()
-        self._tasks.put((future, lambda: self._in_context(work)))
+        self._tasks.put((future, work))
         return future.result()
 
     def later(self, work: Callable[[], object]) -> None:
@@ -81,19 +69,24 @@ class GraphicsThread:
         while (task := self._tasks.get()) is not None:
             future, work = task
             try:
-                future.set_result(work())
+                result = work()
             except BaseException as error:  # it belongs to the thread that waits
                 future.set_exception(error)
+            else:
+                self._register_end()
+                future.set_result(result)
+                del result
             del task, future, work  # or the last environment drawn would never be discarded
-        if self._context is not None:
-            self._context.free()
 
-    def _in_context(self, work: Callable[[], Result]) -> Result:
-        if self._context is None:
-            self._context = _open_context()
-            # after MuJoCo has registered its own clean-up, and so before that
+    def _register_end(self) -> None:
+        """Let the end of Python wait for what is being drawn.
+
+        After the first image, by when MuJoCo has registered what ends OpenGL: that is then called
+        after this.
+        """
+        if not self._is_registered:
             atexit.register(self._end)
-        return work()
+            self._is_registered = True
 
     def _end(self) -> None:
         self._has_ended = True
@@ -109,45 +102,3 @@ class GraphicsThread:
 
 
 GRAPHICS = GraphicsThread()
-
-
-def has_display() -> bool:
-    """Whether a window can be opened."""
-    displays = ("DISPLAY", "WAYLAND_DISPLAY")
-    return sys.platform != "linux" or any(os.environ.get(name) for name in displays)
-
-
-def _open_context() -> Any:
-    """Return an OpenGL context that is current in this thread.
-
-    Raises:
-        RenderingError: there is none.
-    """
-    refusals = []
-    for name in _backends():
-        try:
-            context = importlib.import_module(_MODULES[name]).GLContext(640, 480)
-            context.make_current()
-        except Exception as error:  # OpenGL's libraries raise whatever they like
-            refusals.append(f"{name}: {error}")
-        else:
-            return context
-    raise RenderingError(
-        f"Cannot render: no OpenGL here ({'; '.join(refusals) or 'MUJOCO_GL switches it off'}). "
-        "Headless machines need EGL or OSMesa (Debian: libegl1 libgl1-mesa-dri); MUJOCO_GL=egl or "
-        "osmesa chooses one of them."
-    )
-
-
-def _backends() -> tuple[str, ...]:
-    chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
-    if chosen in _SWITCHED_OFF:
-        return ()
-    if chosen in _MODULES:
-        return (chosen,)
-    if sys.platform == "darwin":
-        return ("cgl", "glfw")
-    if sys.platform != "linux":
-        return ("glfw",)
-    # EGL first even with a display: who closes a window with GLFW closes all of GLFW's contexts
-    return ("egl", "glfw") if has_display() else ("egl",)

@@ -9,7 +9,8 @@ import mujoco
 from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.graphics import GRAPHICS, has_display
+from defmanip_gym.envs.graphics import GRAPHICS
+from defmanip_gym.envs.opengl import has_display
 from defmanip_gym.envs.stage import Image, Stage
 from defmanip_gym.envs.view_params import MOST_PIXELS, ViewParams
 from defmanip_gym.errors import RenderingError

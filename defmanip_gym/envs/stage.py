@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.graphics import GRAPHICS
+from defmanip_gym.envs.opengl import open_context
 from defmanip_gym.envs.view_params import ViewParams
 from defmanip_gym.plant import names
 from defmanip_gym.plant.scene import swing_color
@@ -39,6 +40,7 @@ class Stage:
         screen.offwidth, screen.offheight = view.width, view.height
         # most of what a small image costs is its shadow, drawn finer than can be seen
         quality.shadowsize = min(quality.shadowsize, 8 * max(view.width, view.height))
+        self._opengl: Any = None
         self._context: Any = None
         self._free: Callable[[], object] | None = None
 
@@ -72,13 +74,31 @@ class Stage:
             self._free()
 
     def _context_for(self, width: int, height: int) -> mujoco.MjrContext:
+        """Return MuJoCo's drawing context, with its OpenGL context current."""
         if self._context is None:
-            self._context = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100)
-            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+            self._opengl, self._context, free = _opened(self.model)
             # environments are also discarded unclosed, and by any thread
-            self._free = weakref.finalize(self, GRAPHICS.later, self._context.free)
+            self._free = weakref.finalize(self, GRAPHICS.later, free)
+        self._opengl.make_current()
         context = self._context
         if width > context.offWidth or height > context.offHeight:
             larger = max(width, context.offWidth), max(height, context.offHeight)
             mujoco.mjr_resizeOffscreen(*larger, context)
         return context
+
+
+def _opened(model: mujoco.MjModel) -> tuple[Any, mujoco.MjrContext, Callable[[], None]]:
+    """Return an OpenGL context, MuJoCo's in it, and what frees them.
+
+    One for each model: MuJoCo's contexts disturb each other within one of OpenGL's.
+    """
+    opengl = open_context()
+    context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+
+    def free() -> None:
+        opengl.make_current()
+        context.free()
+        opengl.free()
+
+    return opengl, context, free

@@ -7,7 +7,6 @@ import sys
 import threading
 
 import gymnasium
-import mujoco
 import numpy as np
 import pytest
 
@@ -55,38 +54,32 @@ def lone():
     return images
 
 
-@pytest.mark.parametrize("pair", itertools.combinations_with_replacement(range(4), 2))
-def test_two_environments_may_be_made_drawn_and_closed_in_any_order(pair, lone):
-    steps = [(which, step) for which in (0, 1) for step in ("make", "draw", "close")]
-    for order in itertools.permutations(steps):
-        if any(order.index(a) > order.index(b) for a, b in itertools.pairwise(steps[:3])):
-            continue
-        if any(order.index(a) > order.index(b) for a, b in itertools.pairwise(steps[3:])):
-            continue
-        envs = {}
-        for which, step in order:
-            if step == "make":
-                envs[which] = MAKERS[pair[which]]()
-            elif step == "close":
-                envs.pop(which).close()
-            for other, env in envs.items():
-                # a second environment is first drawn early, or after the first was closed
-                if step != "make":
-                    np.testing.assert_array_equal(image(env), lone[pair[other]], str(order))
+@pytest.mark.parametrize("pair", [(0, 0), (0, 1), (0, 2), (2, 3)])
+@pytest.mark.parametrize("made", ["first", "when drawn"])
+def test_two_environments_may_be_made_drawn_and_closed_in_any_order(pair, made, lone):
+    for order in set(itertools.permutations([0, 0, 1, 1])):  # twice: to be drawn, then closed
+        envs = [MAKERS[kind]() for kind in pair] if made == "first" else [None, None]
+        is_open = [False, False]
+        for which in order:
+            if is_open[which]:
+                envs[which].close()
+            else:
+                envs[which] = envs[which] or MAKERS[pair[which]]()
+            is_open[which] = not is_open[which]
+            for i in np.flatnonzero(is_open):
+                np.testing.assert_array_equal(image(envs[i]), lone[pair[i]], str(order))
 
 
-@pytest.mark.parametrize("kinds", itertools.combinations(range(4), 3))
-def test_three_environments_may_be_drawn_and_closed_in_any_order(kinds, lone):
+@pytest.mark.parametrize("kinds", [(0, 1, 2), (3, 2, 0)])
+def test_three_environments_may_be_closed_in_any_order(kinds, lone):
     envs = [MAKERS[kind]() for kind in kinds]
-    for drawn, closed in itertools.product(itertools.permutations(range(3)), repeat=2):
-        for i in drawn:
+    for order in itertools.permutations(range(3)):
+        for i in range(3):  # a closed environment that is drawn again opens again
             np.testing.assert_array_equal(image(envs[i]), lone[kinds[i]])
-        for i in closed:  # a closed environment that is drawn again opens again
-            envs[i].close()
-            for other in {0, 1, 2} - {i}:
-                np.testing.assert_array_equal(image(envs[other]), lone[kinds[other]])
-    for env in envs:
-        env.close()
+        for closed in range(3):
+            envs[order[closed]].close()
+            for i in order[closed + 1 :]:
+                np.testing.assert_array_equal(image(envs[i]), lone[kinds[i]], str(order))
 
 
 def test_discarding_an_environment_unclosed_leaves_the_others(lone):
@@ -101,12 +94,13 @@ def test_discarding_an_environment_unclosed_leaves_the_others(lone):
 def test_what_an_unclosed_environment_drew_with_is_freed():
     env = single(0)
     env.render()
-    context = env.unwrapped._renderer._stage._context
-    del env
+    stage = env.unwrapped._renderer._stage
+    free, opengl = stage._free, stage._opengl
+    assert free.alive
+    del env, stage
     gc.collect()
     single(0).render()  # what is freed is freed before the next image
-    with pytest.raises(mujoco.FatalError):
-        mujoco.mjr_render(mujoco.MjrRect(0, 0, 1, 1), mujoco.MjvScene(), context)
+    assert not free.alive and opengl._context is None
 
 
 def test_gymnasiums_own_environments_and_ours_leave_each_other_alone(lone, monkeypatch):
@@ -154,17 +148,18 @@ def test_errors_reach_the_thread_that_asked_and_the_next_image_is_drawn():
     assert graphics.run(lambda: 7) == 7
 
 
-def test_without_opengl_there_is_an_error_until_there_is_one(monkeypatch):
-    graphics = GraphicsThread()
+def test_without_opengl_there_is_an_error_until_there_is_one(monkeypatch, lone):
+    env = single(0)
     monkeypatch.setenv("MUJOCO_GL", "off")
     with pytest.raises(RenderingError, match="MUJOCO_GL"):
-        graphics.run(lambda: 7)
+        env.render()
     monkeypatch.delenv("MUJOCO_GL")
-    assert graphics.run(lambda: 7) == 7
+    np.testing.assert_array_equal(image(env), lone[0])
+    env.close()
 
 
 SCRIPT = """
-import os, sys, gymnasium, defmanip_gym
+import os, signal, sys, gymnasium, defmanip_gym
 from defmanip_gym.errors import RenderingError
 
 def draw():
@@ -175,6 +170,7 @@ def draw():
 def in_child(work):
     child = os.fork()
     if not child:
+        signal.alarm(60)  # one that hangs is no one's
         try:
             work()
         except RenderingError as error:
@@ -201,6 +197,7 @@ def test_a_forked_child_draws_if_its_parent_has_not_and_else_says_what_to_do():
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL is Linux's")
 def test_a_forked_child_also_notices_what_its_parent_drew_without_this_package():
     script = """
+gymnasium.make("DeformTransport-v0")
 from mujoco.egl import GLContext
 context = GLContext(1, 1)
 print(in_child(draw))
