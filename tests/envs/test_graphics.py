@@ -183,7 +183,10 @@ def in_child(work):
 
 def run(script):
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT + script], capture_output=True, text=True, timeout=120
+        [sys.executable, "-W", "ignore", "-c", SCRIPT + script],
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
     assert (done.returncode, done.stderr) == (0, ""), done
     return done.stdout.split()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import AddRenderObservation
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
@@ -209,6 +210,18 @@ def test_views_travel_with_pickles_and_specifications(view):
     again = gymnasium.make_vec(EnvSpec.from_json(envs.spec.to_json()))
     np.testing.assert_array_equal(picture(again), picture(envs))
     assert np.array_equal(picture(again)[0], image)
+
+
+@draws
+def test_pixels_are_observations_through_gymnasiums_wrapper():
+    env = AddRenderObservation(make(width=84, height=84))
+    assert env.observation_space == gymnasium.spaces.Box(0, 255, (84, 84, 3), np.uint8)
+    seen = [env.reset(seed=0, options={"start": "paper"})[0]]
+    seen += [env.step(np.array([1.0, 0.0, 0.0]))[0] for _ in range(20)]
+    assert all(pixels in env.observation_space for pixels in seen)
+    np.testing.assert_array_equal(seen[-1], env.unwrapped.render())
+    assert not np.array_equal(seen[0], seen[-1])
+    env.close()
 
 
 @draws
