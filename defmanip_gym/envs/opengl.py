@@ -18,6 +18,10 @@ _MODULES = {
     "glx": "mujoco.glfw",
     "wgl": "mujoco.glfw",
 }
+REMEDY = (
+    "Headless machines need EGL or OSMesa (Debian: libegl1 libgl1-mesa-dri); "
+    "MUJOCO_GL=egl or osmesa chooses one of them."
+)
 _SWITCHED_OFF = ("disable", "disabled", "off", "false", "0")
 
 
@@ -42,11 +46,8 @@ def open_context() -> Any:
             refusals.append(f"{name}: {error}")
         else:
             return context
-    raise RenderingError(
-        f"Cannot render: no OpenGL here ({'; '.join(refusals) or 'MUJOCO_GL switches it off'}). "
-        "Headless machines need EGL or OSMesa (Debian: libegl1 libgl1-mesa-dri); MUJOCO_GL=egl or "
-        "osmesa chooses one of them."
-    )
+    found = "; ".join(refusals) or "MUJOCO_GL switches it off"
+    raise RenderingError(f"Cannot render: no OpenGL here ({found}). {REMEDY}")
 
 
 def _backends() -> tuple[str, ...]:

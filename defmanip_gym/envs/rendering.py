@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -10,7 +10,7 @@ from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.graphics import GRAPHICS
-from defmanip_gym.envs.opengl import has_display
+from defmanip_gym.envs.opengl import REMEDY, has_display
 from defmanip_gym.envs.stage import Image, Stage
 from defmanip_gym.envs.view_params import MOST_PIXELS, ViewParams
 from defmanip_gym.errors import RenderingError
@@ -123,15 +123,12 @@ class TransportRenderer:
             ) from error
 
 
-def _drawn(draw: Any) -> tuple[Image, ...]:
+def _drawn(draw: Callable[[], tuple[Image, ...]]) -> tuple[Image, ...]:
     """Return what ``draw`` returns on the graphics thread; what MuJoCo says becomes our error."""
     try:
         return GRAPHICS.run(draw)
     except (mujoco.FatalError, mujoco.UnexpectedError) as error:
-        raise RenderingError(
-            f"Cannot render: {error}. Try smaller images, or another OpenGL: MUJOCO_GL=egl or "
-            "osmesa chooses one."
-        ) from error
+        raise RenderingError(f"Cannot render: {error}. {REMEDY}") from error
 
 
 def _window(stage: Stage, view: ViewParams) -> MujocoRenderer:
