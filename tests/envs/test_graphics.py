@@ -2,6 +2,7 @@
 
 import gc
 import itertools
+import os
 import subprocess
 import sys
 import threading
@@ -14,6 +15,8 @@ from defmanip_gym.envs.graphics import GraphicsThread
 from defmanip_gym.errors import RenderingError
 
 pytestmark = pytest.mark.usefixtures("opengl")
+
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="only POSIX forks")
 
 ENV_ID = "DeformTransport-v0"
 SMALL = {"width": 40, "height": 30}
@@ -192,7 +195,7 @@ def run(script):
     return done.stdout.split()
 
 
-@pytest.mark.skipif(not hasattr(sys, "abiflags"), reason="only POSIX forks")
+@forks
 def test_a_forked_child_draws_if_its_parent_has_not_and_else_says_what_to_do():
     assert run("print(in_child(draw)); draw(); print(in_child(draw))") == ["0", "3"]
 
@@ -208,6 +211,7 @@ print(in_child(draw))
     assert run(script) == ["3"]
 
 
+@forks
 def test_a_parent_goes_on_drawing_when_its_children_have_ended():
     script = """
 env, first = draw()
