@@ -9,7 +9,7 @@ from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering import TransportRenderer
-from defmanip_gym.plant.names import TRACKING_CAMERA
+from defmanip_gym.envs.view_params import ViewParams
 
 FOLDER = Path(__file__).parent / "images"
 
@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent / "images"
 def strip() -> Image.Image:
     """Return the robot on its way, braking hard with the beam near its limit, and at the goal."""
     engine = TransportEngine(TransportConfig(constraint_mode="cost"), num_envs=1)
-    renderer = TransportRenderer(engine, width=480, height=420, camera=TRACKING_CAMERA)
+    renderer = TransportRenderer(engine, ViewParams(width=480, height=420))
     frames = []
     engine.reset(options={"start": "paper"})
     for _ in range(24):

@@ -6,11 +6,23 @@ import pytest
 from hypothesis import settings
 
 import defmanip_gym  # noqa: F401
+from defmanip_gym.envs.graphics import GRAPHICS
+from defmanip_gym.envs.opengl import open_context
+from defmanip_gym.errors import RenderingError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant.simulation import Simulation
 
 settings.register_profile("repeatable", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session")
+def opengl():
+    """Skip tests that draw where no OpenGL can be had."""
+    try:
+        GRAPHICS.run(lambda: open_context().free())
+    except RenderingError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture

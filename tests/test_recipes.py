@@ -37,7 +37,9 @@ def make(mode):
 
 
 @pytest.mark.parametrize("heading, script", scripts())
-def test_every_script_runs(heading, script):
+def test_every_script_runs(heading, script, request):
+    if "render_mode" in script:
+        request.getfixturevalue("opengl")
     if "torchrl" in script:
         pytest.importorskip("torchrl")
     exec(compile(script, f"recipes.md, {heading}", "exec"), {"__name__": "recipe"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -15,6 +16,8 @@ from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfi
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess
 from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
+from defmanip_gym.envs.stage import Image
+from defmanip_gym.envs.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_choice, require_seed
@@ -113,6 +116,11 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | Argument        | Default          | Meaning                                                |
     | --------------- | ---------------- | ------------------------------------------------------ |
     | render_mode     | `None`           | `"human"`, `"rgb_array"` or `"depth_array"`            |
+    | width           | 640              | of images, pixels                                      |
+    | height          | 480              | the same                                               |
+    | camera_id       | `None`           | number of a camera of the model, -1 for the free one   |
+    | camera_name     | `None`, `"track"` | `"track"`, `"side"`, `"top"`, `"grasp"`, `"overview"` |
+    | default_camera_config | `None`     | free camera: `FreeCameraParams` or their mapping       |
     | control_mode    | `"task"`         | `"task"` or `"force"`                                  |
     | constraint_mode | `"terminate"`    | `"terminate"`, `"penalty"` or `"cost"`                 |
     | sigma_rad       | π/6              | σ, admissible swing, between 0 and π/3                 |
@@ -136,6 +144,11 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         self,
         *,
         render_mode: str | None = None,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        camera_id: int | None = None,
+        camera_name: str | None = None,
+        default_camera_config: FreeCameraParams | Mapping[str, Any] | None = None,
         control_mode: ControlMode = "task",
         constraint_mode: ConstraintMode = "terminate",
         sigma_rad: float = math.pi / 6,
@@ -150,6 +163,11 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         gymnasium.utils.EzPickle.__init__(
             self,
             render_mode=render_mode,
+            width=width,
+            height=height,
+            camera_id=camera_id,
+            camera_name=camera_name,
+            default_camera_config=default_camera_config,
             control_mode=control_mode,
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
@@ -163,7 +181,16 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         )
         if render_mode is not None:
             require_choice("render_mode", render_mode, RENDER_MODES)
+        view = ViewParams(
+            width=width,
+            height=height,
+            camera_id=camera_id,
+            camera_name=camera_name,
+            default_camera_config=default_camera_config,
+        )
         self.render_mode = render_mode
+        self.width, self.height = view.width, view.height
+        self.camera_id, self.camera_name = view.camera_id, view.camera_name
         self.config = TransportConfig(
             control_mode=control_mode,
             constraint_mode=constraint_mode,
@@ -179,7 +206,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         self.engine = TransportEngine(self.config, num_envs=1)
         self.observation_space = observation_space(self.engine)
         self.action_space = action_space(self.engine)
-        self._renderer: TransportRenderer | None = None
+        self._renderer = TransportRenderer(self.engine, view)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -236,23 +263,41 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         """Gymnasium notes -1 with a generator of the user's, as is done with the generator."""
 
     def render(self) -> Any:
-        """Return an image, (480, 640, 3) uint8 or depth (480, 640) float32, or show a window.
+        """Return an image, (height, width, 3) uint8 or depth (height, width) float32, or show it.
 
         Raises:
-            RenderingError: the machine offers no OpenGL.
+            RenderingError: the machine offers no OpenGL, or no display for a window.
         """
         if self.render_mode is None:
             gymnasium.logger.warn("render() does nothing without a render_mode at construction.")
             return None
-        if self._renderer is None:
-            self._renderer = TransportRenderer(self.engine)
         return self._renderer.render(self.render_mode)
 
+    def render_camera(
+        self,
+        camera: str | int,
+        *,
+        mode: str = "rgb_array",
+        width: int | None = None,
+        height: int | None = None,
+    ) -> Image:
+        """Return an image of another camera, size or kind than ``render``'s; any ``render_mode``.
+
+        Args:
+            camera: name or number of a camera of the model, -1 for the free one.
+            mode: ``"rgb_array"`` or ``"depth_array"``.
+            width: pixels; the environment's by default.
+            height: the same.
+
+        Raises:
+            ParameterError: an unknown camera or mode, or a size outside its range.
+            RenderingError: the machine offers no OpenGL.
+        """
+        return self._renderer.images(mode, camera=camera, width=width, height=height)[0]
+
     def close(self) -> None:
-        """Free the renderer."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        """Free what drawing needs."""
+        self._renderer.close()
 
 
 def observation_space(engine: TransportEngine) -> spaces.Box:

@@ -17,8 +17,10 @@ from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
-from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
+from defmanip_gym.envs.rendering import IMAGE_MODES, TransportRenderer
+from defmanip_gym.envs.stage import Image
 from defmanip_gym.envs.state_tree import fitted
+from defmanip_gym.envs.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
@@ -54,7 +56,12 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
             ``reset(options={"reset_mask": mask})``. Or their values, such as ``"SameStep"``.
         num_threads: physics threads, 0 for one per CPU.
         render_mode: as in the single environment; ``render`` returns a tuple of n images.
-        control_mode: as in the single environment, like all that follow.
+        width: as in the single environment, like all that follow.
+        height: see there.
+        camera_id: see there.
+        camera_name: see there.
+        default_camera_config: see there.
+        control_mode: see there.
         constraint_mode: see there.
         sigma_rad: see there.
         robot: see there.
@@ -67,7 +74,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
     """
 
     metadata: dict[str, Any] = {
-        "render_modes": list(RENDER_MODES[1:]),
+        "render_modes": list(IMAGE_MODES),
         "render_fps": 50,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -80,6 +87,11 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         num_threads: int = 0,
         render_mode: str | None = None,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        camera_id: int | None = None,
+        camera_name: str | None = None,
+        default_camera_config: FreeCameraParams | Mapping[str, Any] | None = None,
         control_mode: ControlMode = "task",
         constraint_mode: ConstraintMode = "terminate",
         sigma_rad: float = math.pi / 6,
@@ -98,6 +110,11 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
             autoreset_mode=autoreset_mode,
             num_threads=num_threads,
             render_mode=render_mode,
+            width=width,
+            height=height,
+            camera_id=camera_id,
+            camera_name=camera_name,
+            default_camera_config=default_camera_config,
             control_mode=control_mode,
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
@@ -113,8 +130,17 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         max_episode_steps = require_whole("max_episode_steps", max_episode_steps, 1)
         num_threads = require_whole("num_threads", num_threads, 0, MOST_WORKERS)
         if render_mode is not None:
-            require_choice("render_mode", render_mode, RENDER_MODES[1:])
+            require_choice("render_mode", render_mode, IMAGE_MODES)
+        view = ViewParams(
+            width=width,
+            height=height,
+            camera_id=camera_id,
+            camera_name=camera_name,
+            default_camera_config=default_camera_config,
+        )
         self.num_envs, self.render_mode = num_envs, render_mode
+        self.width, self.height = view.width, view.height
+        self.camera_id, self.camera_name = view.camera_id, view.camera_name
         self.max_episode_steps = max_episode_steps
         if not isinstance(autoreset_mode, AutoresetMode):
             require_choice("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
@@ -143,7 +169,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._ended = np.zeros(num_envs, dtype=bool)
-        self._renderers: list[TransportRenderer] = []
+        self._renderer = TransportRenderer(self.engine, view)
 
     def reset(
         self,
@@ -254,18 +280,28 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         self._ended = terminated | truncated
         return observation, np.where(fresh, 0.0, scores.rewards), terminated, truncated, info
 
-    def render(self) -> tuple[Any, ...] | None:
-        """Return an image of each episode."""
+    def render(self) -> tuple[Image, ...] | None:
+        """Return an image of each episode.
+
+        Raises:
+            RenderingError: the machine offers no OpenGL.
+        """
         if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing without a render_mode at construction.")
             return None
-        if not self._renderers:
-            self._renderers = [
-                TransportRenderer(self.engine, index=i) for i in range(self.num_envs)
-            ]
-        return tuple(renderer.render(self.render_mode) for renderer in self._renderers)
+        return self._renderer.images(self.render_mode)
+
+    def render_camera(
+        self,
+        camera: str | int,
+        *,
+        mode: str = "rgb_array",
+        width: int | None = None,
+        height: int | None = None,
+    ) -> tuple[Image, ...]:
+        """Return an image of each episode; see the single environment's method."""
+        return self._renderer.images(mode, camera=camera, width=width, height=height)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Free the renderers."""
-        for renderer in self._renderers:
-            renderer.close()
-        self._renderers = []
+        """Free what drawing needs."""
+        self._renderer.close()

@@ -14,7 +14,8 @@ from defmanip_gym.plant.beam_body import add_beam, add_pitch_hinge, set_inertia
 from defmanip_gym.plant.scene import (
     ROBOT_COLOR,
     WHEEL_COLOR,
-    add_tracking_camera,
+    add_base_cameras,
+    add_grasp_camera,
     dress,
 )
 
@@ -49,6 +50,7 @@ def build_model(
     forearm.add_site(
         name=names.GRASP_SITE, pos=[robot.forearm.length_m, 0, 0], size=[0.03], rgba=ROBOT_COLOR
     )
+    add_grasp_camera(forearm, robot.forearm.length_m)
     _add_beam(spec, forearm, robot, beam)
     _add_actuators(spec, robot)
     return spec.compile()
@@ -64,7 +66,7 @@ def _add_base(spec: mujoco.MjSpec, robot: RobotParams) -> mujoco.MjsBody:
     set_inertia(base, robot.base_mass_kg, [0, 0, 0.15], [robot.base_yaw_inertia_kgm2] * 3)
     base.add_site(name=names.BASE_SITE, rgba=[0, 0, 0, 0])
     _add_base_geoms(base, robot.shoulder_height_m)
-    add_tracking_camera(base)
+    add_base_cameras(base)
     return base
 
 

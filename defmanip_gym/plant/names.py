@@ -10,7 +10,8 @@ GRASP_FORCE = "grasp_force"
 ROOT_DAMPER = "swing_from_vertical"
 DRIVE, STEERING, SHOULDER_MOTOR, ELBOW_MOTOR = "drive", "steering", "shoulder_motor", "elbow_motor"
 NO_SLIP = "no_lateral_slip"
-TRACKING_CAMERA, OVERVIEW_CAMERA = "tracking", "overview"
+TRACKING_CAMERA, SIDE_CAMERA, TOP_CAMERA = "track", "side", "top"
+GRASP_CAMERA, OVERVIEW_CAMERA = "grasp", "overview"
 GOAL_SITE = "goal"
 
 # order of T_r = (f_b, α_b, τ1, τ2) in ctrl

@@ -60,15 +60,29 @@ def dress(spec: mujoco.MjSpec, goal_position_m: tuple[float, float, float]) -> N
     _add_cameras(world)
 
 
-def add_tracking_camera(base: mujoco.MjsBody) -> None:
-    """Add the camera that follows the robot without turning with it."""
-    camera = base.add_camera(
-        name=names.TRACKING_CAMERA,
-        pos=[0.45, -2.5, 1.35],
-        xyaxes=[1, 0, 0, 0, 0.24, 0.97],
-        fovy=42,
+def add_base_cameras(base: mujoco.MjsBody) -> None:
+    """Add the cameras that follow the robot, and the one that turns with it."""
+    following = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
+    from_behind, from_above = [1, 0, 0, 0, 0.24, 0.97], [1, 0, 0, 0, 1, 0]
+    track = base.add_camera(
+        name=names.TRACKING_CAMERA, pos=[0.45, -2.5, 1.35], xyaxes=from_behind, fovy=42
     )
-    camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
+    top = base.add_camera(name=names.TOP_CAMERA, pos=[0, 0, 5.0], xyaxes=from_above, fovy=42)
+    track.mode = top.mode = following
+    # the plane in which arm and beam swing is the image's
+    base.add_camera(
+        name=names.SIDE_CAMERA, pos=[0.5, -2.6, 0.6], xyaxes=[1, 0, 0, 0, 0, 1], fovy=42
+    )
+
+
+def add_grasp_camera(forearm: mujoco.MjsBody, length_m: float) -> None:
+    """Add the camera on the forearm that looks past its end onto the beam."""
+    forearm.add_camera(
+        name=names.GRASP_CAMERA,
+        pos=[length_m - 0.3, -0.5, 0.1],
+        xyaxes=[0.5, -0.35, 0, 0.14, 0.2, 0.37],
+        fovy=60,
+    )
 
 
 def swing_color(largest_swing_rad: float, sigma_rad: float) -> np.ndarray:

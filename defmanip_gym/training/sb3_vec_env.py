@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 
 _SPACES = ("observation_space", "action_space")
-_ONE_FOR_EACH = ("np_random", "np_random_seed", "render")
+_ONE_FOR_EACH = ("np_random", "np_random_seed", "render", "render_camera")
 
 
 class Sb3VecEnv(VecEnv):
@@ -27,8 +27,7 @@ class Sb3VecEnv(VecEnv):
 
     To SB3 each episode is an environment. Attributes and methods are the batch's, looked for from
     the outermost wrapper inwards, and every index gets the same; what Gymnasium keeps for each
-    episode (``np_random``, ``np_random_seed``, images of ``render``) and the spaces are those of
-    the index.
+    episode (``np_random``, ``np_random_seed``), images and the spaces are those of the index.
 
     The info dict of an episode that ends holds what SB3 reads (``terminal_observation``,
     ``TimeLimit.truncated``, and ``episode`` with return, length and cost) and the environment's

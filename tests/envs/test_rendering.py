@@ -8,7 +8,7 @@ import defmanip_gym  # noqa: F401
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering import TransportRenderer
-from defmanip_gym.errors import RenderingError
+from defmanip_gym.envs.view_params import ViewParams
 from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.names import OVERVIEW_CAMERA
 from defmanip_gym.plant.scene import BEAM_COLOR, LIMIT_COLOR, swing_color
@@ -16,16 +16,7 @@ from defmanip_gym.plant.scene import BEAM_COLOR, LIMIT_COLOR, swing_color
 ENV_ID = "DeformTransport-v0"
 
 
-@pytest.fixture(scope="module", autouse=True)
-def opengl():
-    env = gymnasium.make(ENV_ID, render_mode="rgb_array")
-    env.reset(seed=0)
-    try:
-        env.render()
-    except RenderingError as error:
-        pytest.skip(f"no OpenGL on this machine: {error}")
-    finally:
-        env.close()
+pytestmark = pytest.mark.usefixtures("opengl")
 
 
 def reddish(image):
@@ -87,7 +78,8 @@ def test_batch_renders_each_episode():
 def test_overview_camera_sees_the_goal():
     engine = TransportEngine(TransportConfig(), num_envs=1)
     engine.reset(options={"start": "paper"})
-    renderer = TransportRenderer(engine, width=320, height=240, camera=OVERVIEW_CAMERA)
+    view = ViewParams(width=320, height=240, camera_name=OVERVIEW_CAMERA)
+    renderer = TransportRenderer(engine, view)
     image = renderer.render("rgb_array").astype(int)
     assert (image[..., 0] > image[..., 2] + 60).sum() > 20  # the goal's orange
     renderer.close()

@@ -252,6 +252,18 @@ def test_attributes_and_wrappers_are_those_of_the_batch():
     assert venv.env_is_wrapped(gymnasium.wrappers.vector.ClipReward) == [False, False]
 
 
+@pytest.mark.usefixtures("opengl")
+def test_images_are_those_of_the_index():
+    inner = batch(2, width=32, height=24, render_mode="rgb_array")
+    venv = Sb3VecEnv(inner)
+    venv.seed(0)
+    venv.reset()
+    for images in (venv.env_method("render_camera", "side"), venv.env_method("render")):
+        assert [image.shape for image in images] == [(24, 32, 3)] * 2
+        assert not np.array_equal(*images)
+    np.testing.assert_array_equal(venv.get_images(), images)
+
+
 def test_methods_and_attributes_of_the_batch_can_be_reached_and_set():
     inner = batch(2)
     venv = Sb3VecEnv(gymnasium.wrappers.vector.RecordEpisodeStatistics(inner))
