@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.rendering import TransportRenderer
-from defmanip_gym.envs.view_params import ViewParams
+from defmanip_gym.envs.rendering.renderer import TransportRenderer
+from defmanip_gym.envs.rendering.view_params import ViewParams
 from resident_memory import resident_mib
 from turns import Candidate, take_turns
 

@@ -8,8 +8,8 @@ from PIL import Image
 from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.rendering import TransportRenderer
-from defmanip_gym.envs.view_params import ViewParams
+from defmanip_gym.envs.rendering.renderer import TransportRenderer
+from defmanip_gym.envs.rendering.view_params import ViewParams
 
 FOLDER = Path(__file__).parent / "images"
 

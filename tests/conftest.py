@@ -6,8 +6,8 @@ import pytest
 from hypothesis import settings
 
 import defmanip_gym  # noqa: F401
-from defmanip_gym.envs.graphics import GRAPHICS
-from defmanip_gym.envs.opengl import open_context
+from defmanip_gym.envs.rendering.graphics import GRAPHICS
+from defmanip_gym.envs.rendering.opengl import open_context
 from defmanip_gym.errors import RenderingError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant.simulation import Simulation

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess
-from defmanip_gym.envs.rendering import RENDER_MODES, TransportRenderer
-from defmanip_gym.envs.stage import Image
-from defmanip_gym.envs.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
+from defmanip_gym.envs.rendering.renderer import RENDER_MODES, TransportRenderer
+from defmanip_gym.envs.rendering.stage import Image
+from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_choice, require_seed

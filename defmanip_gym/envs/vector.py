@@ -17,10 +17,10 @@ from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
-from defmanip_gym.envs.rendering import IMAGE_MODES, TransportRenderer
-from defmanip_gym.envs.stage import Image
+from defmanip_gym.envs.rendering.renderer import IMAGE_MODES, TransportRenderer
+from defmanip_gym.envs.rendering.stage import Image
+from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.envs.state_tree import fitted
-from defmanip_gym.envs.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
 from defmanip_gym.task_params import TaskParams

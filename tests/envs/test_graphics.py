@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from defmanip_gym.envs.graphics import GraphicsThread
+from defmanip_gym.envs.rendering.graphics import GraphicsThread
 from defmanip_gym.errors import RenderingError
 
 pytestmark = pytest.mark.usefixtures("opengl")

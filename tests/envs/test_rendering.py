@@ -7,8 +7,8 @@ import pytest
 import defmanip_gym  # noqa: F401
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.rendering import TransportRenderer
-from defmanip_gym.envs.view_params import ViewParams
+from defmanip_gym.envs.rendering.renderer import TransportRenderer
+from defmanip_gym.envs.rendering.view_params import ViewParams
 from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.names import OVERVIEW_CAMERA
 from defmanip_gym.plant.scene import BEAM_COLOR, LIMIT_COLOR, swing_color

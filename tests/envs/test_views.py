@@ -11,8 +11,8 @@ from gymnasium.wrappers import AddRenderObservation
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.rendering import TransportRenderer
-from defmanip_gym.envs.view_params import FreeCameraParams, ViewParams
+from defmanip_gym.envs.rendering.renderer import TransportRenderer
+from defmanip_gym.envs.rendering.view_params import FreeCameraParams, ViewParams
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams
 

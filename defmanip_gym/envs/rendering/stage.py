@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.graphics import GRAPHICS
-from defmanip_gym.envs.opengl import open_context
-from defmanip_gym.envs.view_params import ViewParams
+from defmanip_gym.envs.rendering.graphics import GRAPHICS
+from defmanip_gym.envs.rendering.opengl import open_context
+from defmanip_gym.envs.rendering.view_params import ViewParams
 from defmanip_gym.plant import names
 from defmanip_gym.plant.scene import swing_color
 
