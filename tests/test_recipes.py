@@ -38,8 +38,9 @@ def make(mode):
 
 @pytest.mark.parametrize("heading, script", scripts())
 def test_every_script_runs(heading, script):
-    if "torchrl" in script:
-        pytest.importorskip("torchrl")
+    for module in ("torch", "stable_baselines3", "torchrl"):
+        if re.search(rf"^(?:import|from) {module}\b", script, re.M):
+            pytest.importorskip(module)
     exec(compile(script, f"recipes.md, {heading}", "exec"), {"__name__": "recipe"})
 
 
