@@ -33,8 +33,8 @@ class Python:
     def environment(self, folder: Path, *requirements: str) -> Path:
         """Make an environment with what is named, at the pinned versions; return its programs."""
         subprocess.run([self.program, "-m", "venv", folder], check=True)
-        pip = [folder / "bin" / "python", "-m", "pip", "install", "--quiet"]
-        pins = ["--constraint", ROOT / "constraints.txt"]
+        pip = [str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet"]
+        pins = ["--constraint", str(ROOT / "constraints.txt")]
         answer = subprocess.run(
             [*pip, *pins, *requirements], cwd=ROOT, capture_output=True, text=True, check=False
         )

@@ -23,7 +23,7 @@ def outcome(python: Python, folder: Path, workers: int) -> tuple[bool, str]:
     if subprocess.run([programs / "python", "-c", there], check=False).returncode:
         sys.exit("The core's tests installed torch, which belongs to training.")
     print(f"Python {python.name}", flush=True)
-    pytest = [programs / "python", "-m", "pytest", "--numprocesses", str(workers)]
+    pytest = [str(programs / "python"), "-m", "pytest", "--numprocesses", str(workers)]
     answer = subprocess.Popen(pytest, cwd=ROOT, stdout=subprocess.PIPE, text=True)
     line = ""
     for line in answer.stdout or ():
