@@ -1,10 +1,10 @@
 """Build sdist and wheel, and run the installed wheel with every Python that is supported.
 
-``python .ci/check_wheel.py [python ...]`` builds the wheel from the sdist, into ``dist/``, holds
-its content against what git tracks, and installs it into an empty environment of each Python
-named, by default of each one found. There it runs from outside of the checkout: first as the user
-who installed it, then as one who can write to no folder of the package and has no home. Exit
-status: 0 where all of this works, 1 otherwise.
+``python .ci/check_wheel.py [python ...]`` builds the sdist from what git tracks and the wheel from
+the sdist, into ``dist/``, looks for the whole package in it, and installs it into an empty
+environment of each Python named, by default of each one found. There it runs from outside of the
+checkout: first as the user who installed it, then as one who can write to no folder of the package
+and has no home. Exit status: 0 where all of this works, 1 otherwise.
 """
 
 from __future__ import annotations
@@ -150,12 +150,24 @@ CHECKS: dict[str, Callable[[Place], None]] = {
 }
 
 
+def tracked() -> list[str]:
+    """Return the names of the files that git tracks."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return [name for name in listed.stdout.split("\0") if (ROOT / name).is_file()]
+
+
 def built(python: Python, folder: Path) -> Path:
-    """Build the sdist and the wheel from it; return the wheel."""
-    programs = python.environment(folder, "build")
+    """Build the sdist from what git tracks, and the wheel from it; return the wheel."""
+    source, programs = folder / "source", python.environment(folder / "building", "build")
+    # setuptools packs what an earlier build has listed in *.egg-info; a fresh clone has none
+    for name in tracked():
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, source / name)
     shutil.rmtree(ROOT / "dist", ignore_errors=True)
     answer = subprocess.run(
-        [programs / "python", "-m", "build", "--outdir", ROOT / "dist", ROOT],
+        [programs / "python", "-m", "build", "--outdir", ROOT / "dist", source],
         capture_output=True,
         text=True,
         check=False,
@@ -167,17 +179,11 @@ def built(python: Python, folder: Path) -> Path:
 
 
 def check_content(wheel: Path) -> None:
-    """End the program unless the wheel holds the package as git has it, and the licence."""
-    listed = subprocess.run(
-        ["git", "ls-files", PACKAGE], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    tracked = set(listed.stdout.splitlines())
-    names = set(zipfile.ZipFile(wheel).namelist())
-    held = {name for name in names if name.startswith(f"{PACKAGE}/")}
-    if missing := sorted(tracked - held):
+    """End the program unless the wheel holds the whole package and the licence."""
+    names = zipfile.ZipFile(wheel).namelist()
+    wanted = {name for name in tracked() if name.startswith(f"{PACKAGE}/")}
+    if missing := sorted(wanted - set(names)):
         sys.exit(f"The wheel lacks: {', '.join(missing)}.")
-    if more := sorted(held - tracked):
-        sys.exit(f"The wheel holds what git does not track: {', '.join(more)}.")
     if not any(name.endswith(".dist-info/licenses/LICENSE") for name in names):
         sys.exit("The wheel lacks the licence.")
 
@@ -223,7 +229,7 @@ def main() -> None:
         folder = Path(text)
         folder.chmod(0o755)  # for users other than this one
         found = pythons(sys.argv[1:])
-        wheel = built(found[0], folder / "building")
+        wheel = built(found[0], folder)
         check_content(wheel)
         print("Python  ", *(f"{name:>12}" for name in names), flush=True)
         for python in found:
