@@ -1,4 +1,4 @@
-# The project's menu: make compare | benchmark | agents | test | lint | check | clean
+# The project's menu: make compare | benchmark | agents | test | test-core | wheel | lint | check | clean
 # PYTHON=... names the interpreter; else the first of these that runs and is new enough makes .venv
 PYTHON ?=
 PYTHONS := $(or $(PYTHON),python3.11 python3.12 python3.13 python3.14 python3)
@@ -8,7 +8,10 @@ CORE := $(VENV)/.core
 INSTALLED := $(VENV)/.installed
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 
-.PHONY: help install compare benchmark agents committed test lint check clean
+.PHONY: help install compare benchmark agents committed test test-core wheel lint check clean
+
+# Processes that run tests; 0 is one, without another to start it
+WORKERS := 2
 
 # A run folder names environment, recipe and seed
 SEEDS := 0 1 2 3 4
@@ -18,7 +21,7 @@ RUNS := $(foreach recipe,$(RECIPES),$(SEEDS:%=runs/DeformTransport-v0-$(recipe)-
 recipe_and_seed = --algo $(firstword $(subst -seed, ,$*))$(1) --seed $(lastword $(subst -seed, ,$*))
 
 help:
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 # A candidate is run, since a name on the path need not be a Python that works
 $(BIN)/python:
@@ -64,7 +67,13 @@ runs/DeformTransportRandomized-v0-%: | $(INSTALLED) committed
 	$(BIN)/python train.py $(call recipe_and_seed, --env DeformTransportRandomized-v0)
 
 test: $(INSTALLED)  ## run the test suite
-	$(BIN)/python -m pytest --numprocesses 2
+	$(BIN)/python -m pytest --numprocesses $(WORKERS)
+
+test-core: | $(BIN)/python  ## run the tests that need no torch, with every Python found or PYTHON=...
+	$(BIN)/python .ci/test_core.py --workers $(WORKERS) $(PYTHON)
+
+wheel: | $(BIN)/python  ## build dist/, try the wheel with every Python found or PYTHON=...
+	$(BIN)/python .ci/check_wheel.py $(PYTHON)
 
 lint: $(INSTALLED)  ## ruff and mypy
 	$(BIN)/ruff check .
@@ -73,4 +82,4 @@ lint: $(INSTALLED)  ## ruff and mypy
 check: lint test  ## lint and test
 
 clean:  ## remove the environment and all results
-	rm -rf $(VENV) results runs build *.egg-info
+	rm -rf $(VENV) results runs build dist *.egg-info

@@ -14,7 +14,7 @@ from rich.markup import escape
 
 from defmanip_gym.catalogue.config import AgentsConfig
 from defmanip_gym.certification.config import CertifyConfig
-from defmanip_gym.errors import DefmanipError
+from defmanip_gym.errors import DefmanipError, InstallationError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
@@ -64,31 +64,44 @@ def _parsed(kind: type[Config], program: str) -> Config:
 def _run(config: object) -> None:
     if isinstance(config, ComparisonConfig):
         run_comparison(config)
-    elif isinstance(config, TrainConfig):
-        from defmanip_gym.training.train import train  # torch takes seconds to import
-
-        folder = train(config)
-        print(f"Run folder: {folder}")
-    elif isinstance(config, TuneConfig):
-        from defmanip_gym.training.tuning import run_tune
-
-        run_tune(config)
-    elif isinstance(config, ShipConfig):
-        from defmanip_gym.training.shipping import run_ship
-
-        run_ship(config)
+    elif isinstance(config, TrainConfig | TuneConfig | ShipConfig):
+        _run_training(config)
     elif isinstance(config, CertifyConfig):
-        from defmanip_gym.certification.command import run_certify  # as does matplotlib
+        from defmanip_gym.certification.command import run_certify  # matplotlib takes its time
 
         run_certify(config)
     elif isinstance(config, ReproductionConfig):
-        from defmanip_gym.reproduction.reproduce import run_reproduction  # matplotlib, too
+        from defmanip_gym.reproduction.reproduce import run_reproduction  # as above
 
         run_reproduction(config)
     elif isinstance(config, AgentsConfig):
         from defmanip_gym.catalogue.command import run_agents
 
         run_agents(config)
+
+
+def _run_training(config: TrainConfig | TuneConfig | ShipConfig) -> None:
+    """Run a command that imports torch and others, which take seconds and need not be there."""
+    try:
+        if isinstance(config, TrainConfig):
+            from defmanip_gym.training.train import train
+
+            print(f"Run folder: {train(config)}")
+        elif isinstance(config, TuneConfig):
+            from defmanip_gym.training.tuning import run_tune
+
+            run_tune(config)
+        else:
+            from defmanip_gym.training.shipping import run_ship
+
+            run_ship(config)
+    except ModuleNotFoundError as error:
+        raise InstallationError(
+            "the module that training needs",
+            error.name,
+            "one that is installed",
+            "Install it with: pip install 'defmanip_gym[train]'.",
+        ) from error
 
 
 def _guarded(command: Callable[[], None]) -> None:

@@ -102,6 +102,10 @@ class RecordError(InvalidValueError):
     """Evaluation records that cannot be read or do not belong to this comparison."""
 
 
+class InstallationError(InvalidValueError):
+    """A package that is not installed, of those that only some commands need."""
+
+
 class DivergenceError(InvalidValueError):
     """A simulation that diverged where it must not."""
 

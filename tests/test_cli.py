@@ -2,11 +2,13 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+TRAINS = pytest.mark.skipif(find_spec("torch") is None, reason="could not import 'torch'")
 
 
 def run(*words, cwd=ROOT):
@@ -47,7 +49,7 @@ def test_a_reader_that_goes_away_ends_a_command_quietly(words):
     ("words", "said"),
     [
         (("train.py", "--seed", "-1"), "seed"),
-        (("train.py", "--resume", "nowhere"), "train.py"),
+        pytest.param(("train.py", "--resume", "nowhere"), "train.py", marks=TRAINS),
         (("train.py", "--algo", "dqn"), "ppo"),
         (("evaluate.py", "--contestants", "nobody"), "tanner/l1"),
         (("evaluate.py", "--suites", "nomnial"), "mismatch"),
@@ -63,3 +65,11 @@ def test_wrong_input_gets_a_message_and_no_traceback(words, said, tmp_path):
     assert said in answer.stderr + answer.stdout
     assert "Traceback" not in answer.stderr
     assert not list(tmp_path.rglob("*.jsonl"))
+
+
+def test_without_the_packages_for_training_the_remedy_is_named():
+    missing = "import sys; sys.modules['stable_baselines3'] = None"
+    answer = run("-c", f"{missing}; from defmanip_gym.cli import train_main; train_main()")
+    assert answer.returncode == 2
+    assert "defmanip_gym[train]" in "".join(answer.stderr.split())
+    assert "Traceback" not in answer.stderr

@@ -36,8 +36,8 @@ def test_links_and_named_files_exist(document):
 
 
 def test_makefile_has_the_targets_that_the_readme_names():
-    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M))
-    assert set(re.findall(r"^make (\w+)", README, re.M)) <= targets
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
+    assert set(re.findall(r"^make ([\w-]+)", README, re.M)) <= targets
 
 
 def test_bounds_in_the_readme_are_what_certify_returns():

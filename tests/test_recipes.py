@@ -40,8 +40,9 @@ def make(mode):
 def test_every_script_runs(heading, script, request):
     if "render_mode" in script:
         request.getfixturevalue("opengl")
-    if "torchrl" in script:
-        pytest.importorskip("torchrl")
+    for module in ("torch", "stable_baselines3", "torchrl"):
+        if re.search(rf"^(?:import|from) {module}\b", script, re.M):
+            pytest.importorskip(module)
     exec(compile(script, f"recipes.md, {heading}", "exec"), {"__name__": "recipe"})
 
 

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+
+pytest.importorskip("stable_baselines3")
+
 from sb3_contrib import TQC
 from sb3_models import saved, trained
 from stable_baselines3 import PPO, SAC, TD3

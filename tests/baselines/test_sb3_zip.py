@@ -5,6 +5,9 @@ import zipfile
 
 import numpy as np
 import pytest
+
+pytest.importorskip("stable_baselines3")
+
 from sb3_contrib import TQC
 from sb3_models import Spaces, poisoned, saved
 from stable_baselines3 import A2C, PPO, SAC, TD3

@@ -9,6 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+pytest.importorskip("stable_baselines3")
+
 import tyro
 from sb3_models import Spaces, poisoned, saved
 

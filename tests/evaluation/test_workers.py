@@ -69,7 +69,16 @@ def relatives(group):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_path, monkeypatch):
-    there = tmp_path / "parallel"
+    here, there = tmp_path / "here", tmp_path / "parallel"
+    monkeypatch.setattr(comparison, "write_outputs", lambda *_: ((), here))
+    monkeypatch.setattr(comparison, "print_results", lambda *_: None)
+    # first, since it keeps the machine code that the others would tell of compiling
+    comparison.run_comparison(
+        ComparisonConfig(
+            output=here, jobs=1, suites=("all",), episodes=1, contestants=("zero", "random")
+        )
+    )
+
     process = start(there, 2)
     wait_for_a_file(there, process)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
@@ -91,12 +100,4 @@ def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_p
     process = start(there, 2)
     _, errors = process.communicate(timeout=300)
     assert (process.returncode, errors) == (0, "")
-    here = tmp_path / "here"
-    monkeypatch.setattr(comparison, "write_outputs", lambda *_: ((), here))
-    monkeypatch.setattr(comparison, "print_results", lambda *_: None)
-    comparison.run_comparison(
-        ComparisonConfig(
-            output=here, jobs=1, suites=("all",), episodes=1, contestants=("zero", "random")
-        )
-    )
     assert files(there) == files(here) and len(files(here)) == 10

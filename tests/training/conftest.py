@@ -1,6 +1,9 @@
 """Settings of trainings that take a second."""
 
 import pytest
+
+pytest.importorskip("stable_baselines3")
+
 import yaml
 
 from defmanip_gym.envs.registration import ENV_ID
