@@ -25,20 +25,26 @@ import numba.extending
 from filelock import FileLock
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
+from defmanip_gym.compiler import CalleeCompiler, KernelCompiler
+
 # In functions that are both: a number in compiled code, an array (...) when called from Python.
 Numbers: TypeAlias = Any
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
+# nobody calls these from C, and without arrays of their own there are no references to count
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+
 
 def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Compile at the first call, or take the machine code of an earlier run.
 
-    Division by zero gives infinity or NaN, as in NumPy. Without the Global Interpreter Lock.
+    Division by zero gives infinity or NaN, as in NumPy. Without the Global Interpreter Lock. Such
+    functions write into arrays that they are given; they make none, and raise nothing. What only
+    they call is ``compilable``.
     """
-    # nobody calls these from C: without an entry for it less passes through LLVM
-    jitted = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[call-overload]
+    jitted = numba.njit(pipeline_class=KernelCompiler, **_OPTIONS)(function)  # type: ignore[call-overload]
     if hasattr(jitted, "_cache"):  # not with NUMBA_DISABLE_JIT=1, which leaves plain Python
         try:
             jitted._cache = _PackageCache(function)
@@ -49,9 +55,12 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
 
 
 def compilable(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """Let compiled functions call this one; called from Python it stays NumPy on batches."""
+    """Let compiled functions call this one; called from Python it stays Python.
+
+    Such a function may well be called with arrays from Python, if its formulas are NumPy's.
+    """
     marked: Callable[Parameters, Result] = numba.extending.register_jitable(
-        error_model="numpy", no_cfunc_wrapper=True
+        pipeline_class=CalleeCompiler, no_cpython_wrapper=False, **_OPTIONS
     )(function)
     return marked
 
