@@ -11,12 +11,14 @@ function's own file is; these functions call others, in other files, so all of t
 from __future__ import annotations
 
 import functools
+import gc
 import glob
 import hashlib
 import logging
+import os
 import pickle
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
@@ -24,6 +26,7 @@ import numba
 import numba.extending
 from filelock import FileLock
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.compiler_lock import global_compiler_lock
 
 # In functions that are both: a number in compiled code, an array (...) when called from Python.
 Numbers: TypeAlias = Any
@@ -31,14 +34,42 @@ Numbers: TypeAlias = Any
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
+# A child that is forked while another thread compiles would wait for that thread for ever.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=global_compiler_lock.acquire,
+        after_in_parent=global_compiler_lock.release,
+        after_in_child=global_compiler_lock.release,
+    )
+
+
+_LEANER_FOR = "0.68."  # what compiler.py and lowering.py reach into is that of this Numba
+
+
+def _options() -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return Numba's options for functions that Python calls, and that compiled ones call."""
+    # nobody calls these from C
+    common = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    if not numba.__version__.startswith(_LEANER_FOR):
+        return common, common
+    from defmanip_gym.compiler import CalleeCompiler, KernelCompiler
+
+    common["_nrt"] = False  # without arrays of their own there are no references to count
+    callees = {"pipeline_class": CalleeCompiler, "no_cpython_wrapper": False}
+    return common | {"pipeline_class": KernelCompiler}, common | callees
+
+
+_KERNEL, _CALLEE = _options()
+
 
 def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Compile at the first call, or take the machine code of an earlier run.
 
-    Division by zero gives infinity or NaN, as in NumPy. Without the Global Interpreter Lock.
+    Division by zero gives infinity or NaN, as in NumPy. Without the Global Interpreter Lock. Such
+    functions write into arrays that they are given; they make none, and raise nothing. What only
+    they call is ``compilable``.
     """
-    # nobody calls these from C: without an entry for it less passes through LLVM
-    jitted = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[call-overload]
+    jitted = numba.njit(**_KERNEL)(function)
     if hasattr(jitted, "_cache"):  # not with NUMBA_DISABLE_JIT=1, which leaves plain Python
         try:
             jitted._cache = _PackageCache(function)
@@ -49,10 +80,11 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
 
 
 def compilable(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """Let compiled functions call this one; called from Python it stays NumPy on batches."""
-    marked: Callable[Parameters, Result] = numba.extending.register_jitable(
-        error_model="numpy", no_cfunc_wrapper=True
-    )(function)
+    """Let compiled functions call this one; called from Python it stays Python.
+
+    Such a function may well be called with arrays from Python, if its formulas are NumPy's.
+    """
+    marked: Callable[Parameters, Result] = numba.extending.register_jitable(**_CALLEE)(function)
     return marked
 
 
@@ -75,6 +107,18 @@ def machine_code(
     function.compile(signature)  # type: ignore[attr-defined]
     result: Callable[Parameters, Result] = function.overloads[signature].entry_point
     return result
+
+
+@contextmanager
+def without_garbage_collection() -> Iterator[None]:
+    """Do not search for garbage among the many objects that compiling makes, and keeps."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def compiled_sources(package: Path) -> list[Path]:

@@ -12,7 +12,7 @@ import pytest
 
 import defmanip_gym
 from defmanip_gym.compiled import compiled, compiled_sources, sources_stamp
-from defmanip_gym.theory.chain import mass_matrix_at
+from defmanip_gym.plant.plant_state import read_state
 
 EPISODE = """
 import gymnasium, numpy as np
@@ -90,36 +90,69 @@ def run(script, **environment):
     )
 
 
-SOLVE = """
+LIMIT = """
 import numpy as np
-from defmanip_gym.theory.chain import solve_positive_definite
-def solve():
-    b = np.ones(1)
-    solve_positive_definite(np.full((1, 1), 2.0), b)
-    assert b[0] == 0.5
+from defmanip_gym.theory.control_laws import _limit_speeds, limit_speed
+def limit():
+    limited = limit_speed(np.array((8.0, 0.0, 0.0)), np.zeros(3), 1.0, 0.25)
+    assert limited.tolist() == [4.0, 0.0, 0.0]
 """
 CHILDREN = """
 if __name__ == "__main__":
     import multiprocessing, threading
-    children = [multiprocessing.get_context("fork").Process(target=solve) for _ in range(2)]
+    children = [multiprocessing.get_context("fork").Process(target=limit) for _ in range(2)]
     for child in children: child.start()
     for child in children: child.join()
     assert [child.exitcode for child in children] == [0, 0], children
-    threads = [threading.Thread(target=solve) for _ in range(4)]
+    threads = [threading.Thread(target=limit) for _ in range(4)]
     for thread in threads: thread.start()
     for thread in threads: thread.join()
-    assert solve_positive_definite.overloads
+    assert _limit_speeds.overloads
 """
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 def test_forked_children_and_threads_compile_first(tmp_path):
-    done = run(SOLVE + CHILDREN, NUMBA_CACHE_DIR=str(tmp_path))
+    done = run(LIMIT + CHILDREN, NUMBA_CACHE_DIR=str(tmp_path))
+    assert done.returncode == 0, done.stderr
+
+
+COMPILING = """
+import multiprocessing, threading, time
+import numba
+from numba.core import event
+begun = threading.Event()
+class Listener(event.Listener):
+    def on_start(self, event): begun.set()
+    def on_end(self, event): pass
+@numba.njit
+def long(values):
+    return np.linalg.svd(np.sort(values))[0].sum()
+if __name__ == "__main__":
+    listener = Listener()
+    event.register("numba:run_pass", listener)
+    compiling = threading.Thread(target=long, args=(np.ones((2, 2)),))
+    compiling.start()
+    begun.wait()
+    event.unregister("numba:run_pass", listener)
+    child = multiprocessing.get_context("fork").Process(target=limit)
+    child.start()
+    child.join(60)
+    hangs = child.is_alive()
+    child.kill()
+    assert not hangs and child.exitcode == 0
+    compiling.join()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_child_forked_while_another_thread_compiles_can_compile(tmp_path):
+    done = run(LIMIT + COMPILING, NUMBA_CACHE_DIR=str(tmp_path))
     assert done.returncode == 0, done.stderr
 
 
 def test_compiling_is_told_once_and_only_when_nothing_was_kept(tmp_path):
-    first, second = (run(SOLVE + "solve()", NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
+    first, second = (run(LIMIT + "limit()", NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
     assert first.returncode == second.returncode == 0, first.stderr
     assert first.stderr.count("defmanip_gym: compiling") == 1
     assert "kept for the next time" in first.stderr
@@ -129,7 +162,7 @@ def test_compiling_is_told_once_and_only_when_nothing_was_kept(tmp_path):
 def test_where_nothing_can_be_kept_the_user_is_told_the_remedy(tmp_path):
     (tmp_path / "file").write_text("no folder")
     refusing = "import numba; numba.config.CACHE_LOCATOR_CLASSES = 'UserProvidedCacheLocator'\n"
-    done = run(refusing + SOLVE + "solve()", NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    done = run(refusing + LIMIT + "limit()", NUMBA_CACHE_DIR=str(tmp_path / "file"))
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("NUMBA_CACHE_DIR") == 1
 
@@ -157,20 +190,33 @@ def test_a_killed_process_leaves_no_machine_code_of_other_sources():
 
 def test_machine_code_on_disk_is_dated_by_all_compiled_sources():
     package = Path(defmanip_gym.__file__).parent
-    assert mass_matrix_at._cache._cache_file._source_stamp == sources_stamp(package)
+    assert read_state._cache._cache_file._source_stamp == sources_stamp(package)
+
+
+def numbers(mode, before="", **environment):
+    """Return what an episode in another process comes to."""
+    done = subprocess.run(
+        [sys.executable, "-c", before + EPISODE.format(mode=mode)],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return np.array(done.stdout.split(), dtype=float)
 
 
 def test_compiled_and_interpreted_steps_agree():
     for mode in ("task", "force"):
-        compiled, interpreted = (
-            subprocess.run(
-                [sys.executable, "-c", EPISODE.format(mode=mode)],
-                env={**os.environ, "NUMBA_DISABLE_JIT": disable},
-                capture_output=True,
-                text=True,
-                check=True,
-            ).stdout
-            for disable in ("0", "1")
-        )
-        values = [np.array(text.split(), dtype=float) for text in (compiled, interpreted)]
-        np.testing.assert_allclose(*values, rtol=1e-9, atol=1e-9)
+        interpreted = numbers(mode, NUMBA_DISABLE_JIT="1")
+        np.testing.assert_allclose(numbers(mode), interpreted, rtol=1e-9, atol=1e-9)
+
+
+def test_another_numba_compiles_in_its_own_way_to_the_same_results(tmp_path):
+    another = """
+import sys, numba
+numba.__version__ = "1.0.0"
+import defmanip_gym.compiled
+assert "defmanip_gym.compiler" not in sys.modules
+"""
+    found = numbers("task", another, NUMBA_CACHE_DIR=str(tmp_path))
+    assert np.array_equal(found, numbers("task"))

@@ -46,13 +46,17 @@ class CarriedBeams:
         self._all = np.arange(count)
         self.values: Array = np.tile(_rows([config.beam]).T, count)
         self._object = HangingBeam(config.beam)
+        segments = config.beam.segment_count
+        self._room = np.empty((segments, segments)), np.empty(segments)
         self._held_forces = machine_code(
             held_forces,
             self._object.chain.constants,
             self._object.k_o22,
             np.empty(1),
             np.empty(1),
-            np.empty((1, config.beam.segment_count)),
+            np.empty((1, segments)),
+            *self._room,
+            np.empty((1, 3)),
         )
 
     def draw(self, ids: Ids) -> None:
@@ -69,12 +73,15 @@ class CarriedBeams:
             swing: of their segments, (k, N) rad.
         """
         _, mass_kg, length_m = self.values[:, ids]
-        force_b: Array = self._held_forces(
+        force_b = np.empty((len(ids), 3))
+        self._held_forces(
             self._object.chain.constants,
             self._object.k_o22,
             mass_kg / self._beam.mass_kg,
             length_m / self._beam.length_m,
             swing,
+            *self._room,
+            force_b,
         )
         return force_b
 

@@ -13,13 +13,13 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import machine_code
+from defmanip_gym.compiled import machine_code, without_garbage_collection
 from defmanip_gym.envs.carried_beams import VARIED, CarriedBeams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.disturbance import disturbing_force
 from defmanip_gym.envs.generators import EpisodeGenerators
 from defmanip_gym.envs.inner_loop import InnerLoop
-from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score_starts, score_steps
+from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score
 from defmanip_gym.envs.sensor_noise import SensorNoise
 from defmanip_gym.envs.starts import StartSampler, check_starts, extreme_starts, requested_starts
 from defmanip_gym.envs.state_tree import fitted
@@ -45,6 +45,7 @@ class TransportEngine:
         max_episode_steps: control periods until truncation; never by default.
     """
 
+    @without_garbage_collection()
     def __init__(
         self,
         config: TransportConfig,
@@ -76,20 +77,18 @@ class TransportEngine:
         self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
         self._beams = CarriedBeams(config, self.simulation, self.generators)
         self._is_started = False
+        self._at_rest = np.zeros((num_envs, self.action_size)), np.zeros(num_envs, dtype=np.bool_)
         self._scores = Scores.empty(num_envs, self.layout.size)
         self._plant = PlantState.empty(num_envs, config.beam.segment_count)
         self._plant_before = self._plant.copy()
-        self._score_starts = machine_code(
-            score_starts, self._task, self._goal, self._plant, self._all, self._scores
-        )
-        self._score_steps = machine_code(
-            score_steps,
+        self._score = machine_code(
+            score,
             self._task,
             self._goal,
             self._workspace,
             self._plant,
-            np.empty((num_envs, self.action_size)),
-            np.empty(num_envs, dtype=np.bool_),
+            self._all,
+            *self._at_rest,
             self._steps,
             self._last_step,
             self._scores,
@@ -175,7 +174,7 @@ class TransportEngine:
         self._is_started = True
         self.simulation.read_into(self._plant, ids)
         self._scores = self._scores.copy()
-        self._score_starts(self._task, self._goal, self._plant, ids, self._scores)
+        self._fill_scores(ids, *self._at_rest, before=self._scores)
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
         return self._scores.observations, self.info
@@ -246,9 +245,9 @@ class TransportEngine:
             ResetNeeded: no episode has been started.
         """
         self._require_start()
-        actions = self._inner_loop.clipped(actions, idle)
+        forces = self.simulation.generalized_forces
+        actions = self._inner_loop.write_forces(actions, self._plant, forces, idle=idle)
         before = self._scores
-        self._inner_loop.write_forces(actions, self._plant, self.simulation.generalized_forces)
         if self.config.disturbance.has_force:
             self.simulation.push_grasp(disturbing_force(self.config, self._steps))
         failed = self.simulation.step(self.config.task.substeps)
@@ -258,11 +257,18 @@ class TransportEngine:
         if np.count_nonzero(failed):
             self._plant.freeze(failed, self._plant_before)
         self._scores = Scores.empty(self.num_envs, self.layout.size)
-        self._score_steps(
+        self._fill_scores(self._all, actions, failed, before=before)
+        awake = self._all if idle is None else np.flatnonzero(~idle)
+        self._noise.add(self._scores.observations, awake)
+        return self._scores
+
+    def _fill_scores(self, ids: Ids, actions: Array, failed: BoolArray, *, before: Scores) -> None:
+        self._score(
             self._task,
             self._goal,
             self._workspace,
             self._plant,
+            ids,
             actions,
             failed,
             self._steps,
@@ -270,9 +276,6 @@ class TransportEngine:
             before,
             self._scores,
         )
-        awake = self._all if idle is None else np.flatnonzero(~idle)
-        self._noise.add(self._scores.observations, awake)
-        return self._scores
 
     def _require_start(self) -> None:
         if not self._is_started:

@@ -7,14 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import compiled, machine_code
+from defmanip_gym.compiled import compilable, compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ActionError
 from defmanip_gym.plant.plant_state import PlantState
-from defmanip_gym.theory.control_laws import limit_speed_at
+from defmanip_gym.theory.control_laws import limited_acceleration
 from defmanip_gym.theory.feedback_linearization import (
     FeedbackLinearization,
     NominalModel,
+    StateRoom,
     generalized_forces_at,
 )
 from defmanip_gym.theory.redundancy import RedundancyResolution
@@ -63,23 +64,55 @@ class InnerLoop:
             arm=ArmLengths.of(config.robot),
         )
         actions = np.empty(self._shape)
-        state = PlantState.empty(num_envs, config.beam.segment_count)
-        self._clip = machine_code(_clip, actions)
+        segments = config.beam.segment_count
+        self._state = StateRoom.empty(segments)
+        plant = PlantState.empty(num_envs, segments)
         if self._mode == "force":  # whose first environment need not wait for the linearization
             self._scale = machine_code(_scale, self._force_limits, actions, forces)
         else:
-            self._linearize = machine_code(_linearize, self._constants, actions, state, forces)
+            self._linearize = machine_code(
+                _linearize, self._constants, actions, plant, self._state, forces
+            )
 
-    def clipped(self, actions: Any, idle: BoolArray | None = None) -> Array:
-        """Return the actions, (n, k), clipped to [-1, 1].
+    def write_forces(
+        self,
+        actions: Any,
+        plant: PlantState,
+        forces: Array,
+        *,
+        idle: BoolArray | None = None,
+    ) -> Array:
+        """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
 
         Args:
             actions: as given to the environment.
+            plant: the true state, which the feedback linearization measures without noise.
+            forces: the simulation's ``generalized_forces``, as they were if it raises.
             idle: whose action does not matter, whatever it is, and counts as zero, (n,).
+
+        Returns:
+            The actions, (n, k), clipped to [-1, 1].
 
         Raises:
             ActionError: wrong shape or values that are not finite.
         """
+        values = self._numbers(actions)
+        if idle is not None:
+            values[idle] = 0.0
+        if self._mode == "force":
+            are_finite = self._scale(self._force_limits, values, forces)
+        else:
+            are_finite = self._linearize(self._constants, values, plant, self._state, forces)
+        if not are_finite:
+            raise ActionError(
+                "action",
+                values.tolist() if len(values) == 1 else "an array with NaN or infinity",
+                "finite numbers in [-1, 1]",
+                "Look for a diverged policy or controller.",
+            )
+        return values
+
+    def _numbers(self, actions: Any) -> Array:
         values = number_array(actions)
         if values is None:
             raise ActionError(
@@ -92,36 +125,15 @@ class InnerLoop:
                 f"{self._shape} in {self._mode!r} control mode",
                 "Check the environment's action_space.",
             )
-        if idle is not None:
-            values[idle] = 0.0
-        if not self._clip(values):
-            raise ActionError(
-                "action",
-                values.tolist() if len(values) == 1 else "an array with NaN or infinity",
-                "finite numbers in [-1, 1]",
-                "Look for a diverged policy or controller.",
-            )
         return values
 
-    def write_forces(self, actions: Array, plant: PlantState, forces: Array) -> None:
-        """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
 
-        Args:
-            actions: clipped, (n, k).
-            plant: the true state, which the feedback linearization measures without noise.
-            forces: the simulation's ``generalized_forces``.
-        """
-        if self._mode == "force":
-            self._scale(self._force_limits, actions, forces)
-        else:
-            self._linearize(self._constants, actions, plant, forces)
-
-
-@compiled
+@compilable
 def _clip(actions: Array) -> bool:
     """Clip in place; return whether all values were finite."""
-    for i in range(actions.shape[0]):
-        for k in range(actions.shape[1]):
+    count, size = actions.shape
+    for i in range(count):
+        for k in range(size):
             if not np.isfinite(actions[i, k]):
                 return False
             actions[i, k] = min(max(actions[i, k], -1.0), 1.0)
@@ -129,39 +141,44 @@ def _clip(actions: Array) -> bool:
 
 
 @compiled
-def _scale(limits: Array, actions: Array, forces: Array) -> None:
-    for i in range(forces.shape[0]):
-        for k in range(4):
-            forces[i, k] = limits[k] * actions[i, k]
+def _scale(limits: Array, actions: Array, forces: Array) -> bool:
+    are_finite = _clip(actions)
+    if are_finite:
+        for i in range(len(forces)):
+            for k in range(4):
+                forces[i, k] = limits[k] * actions[i, k]
+    return are_finite
 
 
 @compiled
-def _linearize(loop: LoopConstants, actions: Array, plant: PlantState, forces: Array) -> None:
+def _linearize(
+    loop: LoopConstants, actions: Array, plant: PlantState, state: StateRoom, forces: Array
+) -> bool:
+    if not _clip(actions):
+        return False
     # the forces act for a whole period: take them where the motion will be half-way through it
     half = 0.5 * loop.period_s
-    w, velocity = np.empty(3), np.empty(3)
-    joints, swing = np.empty(2), np.empty(plant.swing.shape[1])
     for i in range(len(actions)):
-        for k in range(3):
-            w[k] = actions[i, k] * loop.max_acceleration_m_s2
         upper, upper_rate = plant.joints[i, 0], plant.joint_rates[i, 0]
         fore, fore_rate = upper + plant.joints[i, 1], upper_rate + plant.joint_rates[i, 1]
         u1, u2 = plant.base_velocity[i, 0], plant.base_velocity[i, 1]
-        velocity[0], velocity[1], velocity[2] = grasp_velocity(
-            loop.arm, upper, fore, upper_rate, fore_rate, u1, u2
+        forward, left, up = grasp_velocity(loop.arm, upper, fore, upper_rate, fore_rate, u1, u2)
+        w_forward, w_left, w_up = limited_acceleration(
+            actions[i, 0] * loop.max_acceleration_m_s2,
+            actions[i, 1] * loop.max_acceleration_m_s2,
+            actions[i, 2] * loop.max_acceleration_m_s2,
+            forward,
+            left,
+            up,
+            loop.max_speed_m_s,
+            loop.period_s,
         )
-        limit_speed_at(w, velocity, loop.max_speed_m_s, loop.period_s)
-        for k in range(2):
-            joints[k] = plant.joints[i, k] + half * plant.joint_rates[i, k]
-        for k in range(len(swing)):
-            swing[k] = plant.swing[i, k] + half * plant.swing_rate[i, k]
-        generalized_forces_at(
-            loop.model,
-            w,
-            joints,
-            plant.joint_rates[i],
-            plant.base_velocity[i],
-            swing,
-            plant.swing_rate[i],
-            forces[i],
-        )
+        state.velocity[0], state.velocity[1] = u1, u2
+        state.velocity[2], state.velocity[3] = upper_rate, fore_rate
+        for k in range(len(state.swing)):
+            state.swing[k] = plant.swing[i, k] + half * plant.swing_rate[i, k]
+            state.velocity[4 + k] = plant.swing_rate[i, k]
+        upper = plant.joints[i, 0] + half * plant.joint_rates[i, 0]
+        fore = upper + (plant.joints[i, 1] + half * plant.joint_rates[i, 1])
+        generalized_forces_at(loop.model, w_forward, w_left, w_up, upper, fore, state, forces, i)
+    return True

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.envs.survey import Goal, survey
 from defmanip_gym.envs.task import (
     Outcome,
@@ -40,7 +40,7 @@ _TERMINATED, _TRUNCATED = len(FLAGS), len(FLAGS) + 1
 _TERMS = MEASURES.index(RewardTerms._fields[0])
 _REWARD = len(MEASURES)
 _POTENTIALS = _REWARD + 1
-_COST, _EPISODE_COST = MEASURES.index("cost"), _POTENTIALS + len(Potentials._fields)
+_EPISODE_COST = _POTENTIALS + len(Potentials._fields)
 _NUMBER_COUNT = _EPISODE_COST + 1
 
 
@@ -106,25 +106,12 @@ class Scores(NamedTuple):
 
 
 @compiled
-def score_starts(
-    task: Task, goal: Goal, plant: PlantState, ids: NDArray[np.intp], scores: Scores
-) -> None:
-    """Fill in the scores of the episodes ``ids`` that have just begun."""
-    no_reward = RewardTerms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for i in ids:
-        state = survey(goal, plant, i, scores.observations[i])
-        outcome = Outcome(is_success(state, task), False, False)
-        _report(scores, i, state, outcome, no_reward, potentials(state, task), task)
-        scores.flags[_TERMINATED, i] = scores.flags[_TRUNCATED, i] = False
-        scores.numbers[_EPISODE_COST, i] = 0.0
-
-
-@compiled
-def score_steps(
+def score(
     task: Task,
     goal: Goal,
     workspace: Workspace,
     plant: PlantState,
+    ids: NDArray[np.intp],
     actions: Array,
     failed: BoolArray,
     steps: NDArray[np.int64],
@@ -132,50 +119,54 @@ def score_steps(
     before: Scores,
     scores: Scores,
 ) -> None:
-    """Fill in the scores of all episodes after a step.
+    """Fill in the scores of episodes after a step, or of those that have just begun.
 
     Args:
         task: its constants.
         goal: of the task.
         workspace: whose borders end episodes.
         plant: the true state.
+        ids: the episodes.
         actions: normalized, (n, k).
         failed: whose simulation diverged, (n,).
-        steps: control periods since each start, (n,).
+        steps: control periods since each start, (n,); 0 has neither reward nor end.
         last_step: the one that truncates.
         before: the scores one step ago.
         scores: to be filled in.
     """
-    for i in range(len(actions)):
-        state = survey(goal, plant, i, scores.observations[i])
+    _, size = actions.shape
+    for row in range(len(ids)):
+        i = ids[row]
+        begins = steps[i] == 0
+        state = survey(goal, plant, i, scores.observations)
         upper, fore = plant.joints[i, 0], plant.joints[i, 0] + plant.joints[i, 1]
-        is_inside = in_workspace(plant.base_pose[i], upper, fore, workspace)
+        x, y = plant.base_pose[i, 0], plant.base_pose[i, 1]
+        is_outside = not in_workspace(x, y, upper, fore, workspace)
         outcome = Outcome(
             success=is_success(state, task) and not failed[i],
-            left_workspace=not failed[i] and not is_inside,
+            left_workspace=is_outside and not (failed[i] or begins),
             simulation_failed=failed[i],
         )
-        margin = constraint_margin(state, task)
-        squared_action = 0.0
-        for k in range(actions.shape[1]):
-            squared_action += actions[i, k] ** 2
-        last = Potentials(
-            before.numbers[_POTENTIALS, i],
-            before.numbers[_POTENTIALS + 1, i],
-            before.numbers[_POTENTIALS + 2, i],
-        )
-        now = potentials(state, task)
-        terms = reward_terms(last, now, squared_action, outcome, margin, task)
-        _report(scores, i, state, outcome, terms, now, task)
-        scores.numbers[_EPISODE_COST, i] = (
-            before.numbers[_EPISODE_COST, i] + scores.numbers[_COST, i]
-        )
-        terminated = outcome.success or is_failure(outcome, margin, task)
+        margin, now = constraint_margin(state, task), potentials(state, task)
+        costs, terms = 0.0, RewardTerms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if not begins:
+            squared_action = 0.0
+            for k in range(size):
+                squared_action += actions[i, k] ** 2
+            last = Potentials(
+                before.numbers[_POTENTIALS, i],
+                before.numbers[_POTENTIALS + 1, i],
+                before.numbers[_POTENTIALS + 2, i],
+            )
+            costs = before.numbers[_EPISODE_COST, i]
+            terms = reward_terms(last, now, squared_action, outcome, margin, task)
+        _report(scores, i, state, outcome, terms, now, margin, costs, task)
+        terminated = not begins and (outcome.success or is_failure(outcome, margin, task))
         scores.flags[_TERMINATED, i] = terminated
         scores.flags[_TRUNCATED, i] = steps[i] >= last_step and not terminated
 
 
-@compiled
+@compilable
 def _report(
     scores: Scores,
     i: int,
@@ -183,20 +174,24 @@ def _report(
     outcome: Outcome,
     terms: RewardTerms,
     now: Potentials,
+    margin: float,
+    costs: float,
     task: Task,
 ) -> None:
     """Write flags and numbers of an episode in the order that ``Scores`` gives them."""
-    margin = constraint_margin(state, task)
-    scores.flags[0, i] = outcome.success
-    scores.flags[1, i] = outcome.left_workspace
-    scores.flags[2, i] = outcome.simulation_failed
-    scores.numbers[0, i] = 1.0 if margin < 0 else 0.0
-    scores.numbers[1, i] = max(state.speed_m_s - task.max_speed_m_s, 0.0)
-    scores.numbers[2, i] = margin
-    scores.numbers[3, i] = state.distance_m
-    scores.numbers[_REWARD, i] = 0.0
+    flags, numbers = scores.flags, scores.numbers
+    flags[0, i] = outcome.success
+    flags[1, i] = outcome.left_workspace
+    flags[2, i] = outcome.simulation_failed
+    cost = 1.0 if margin < 0 else 0.0
+    numbers[0, i] = cost
+    numbers[1, i] = max(state.speed_m_s - task.max_speed_m_s, 0.0)
+    numbers[2, i] = margin
+    numbers[3, i] = state.distance_m
+    numbers[_REWARD, i] = 0.0
     for k in range(len(terms)):
-        scores.numbers[_TERMS + k, i] = terms[k]
-        scores.numbers[_REWARD, i] += terms[k]
+        numbers[_TERMS + k, i] = terms[k]
+        numbers[_REWARD, i] += terms[k]
     for k in range(len(now)):
-        scores.numbers[_POTENTIALS + k, i] = now[k]
+        numbers[_POTENTIALS + k, i] = now[k]
+    numbers[_EPISODE_COST, i] = costs + cost

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import compiled
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
@@ -86,24 +85,12 @@ class StartSampler:
 
     def sample(self, ids: Ids) -> Array:
         """Return the next start of each of the episodes ``ids``, (k, 6)."""
-        starts = np.empty((len(ids), 6))
-        while (spent := _take(ids, self._drawn, self._used, starts)) >= 0:
+        for spent in ids[self._used[ids] == _STARTS_PER_DRAW]:
             self._drawn[spent] = self._generators[spent].random((_STARTS_PER_DRAW, 6))
             self._used[spent] = 0
+        starts = self._drawn[ids, self._used[ids]]
+        self._used[ids] += 1
         return self._lowest + self._width * starts
-
-
-@compiled
-def _take(ids: Ids, drawn: Array, used: NDArray[np.int64], starts: Array) -> int:
-    """Take the next row of each episode, or return the first that has none left (else -1)."""
-    for i in ids:
-        if used[i] == drawn.shape[1]:
-            return int(i)
-    for row, i in enumerate(ids):
-        for k in range(starts.shape[1]):
-            starts[row, k] = drawn[i, used[i], k]
-        used[i] += 1
-    return -1
 
 
 def extreme_starts(params: StartParams) -> Array:
@@ -115,7 +102,7 @@ def extreme_starts(params: StartParams) -> Array:
 def check_starts(starts: Array, config: TransportConfig) -> None:
     """Raise StartError unless every start (k, 6) lies in the workspace and within σ."""
     upper, fore = starts[:, 3], starts[:, 3] + starts[:, 4]
-    inside = in_workspace(starts[:, :3], upper, fore, workspace_of(config))
+    inside = in_workspace(starts[:, 0], starts[:, 1], upper, fore, workspace_of(config))
     inside &= np.abs(starts[:, 2]) < _LARGEST_HEADING_RAD
     within = np.abs(starts[:, 5]) <= config.sigma_rad
     for start, reachable, straight in zip(starts, inside, within, strict=True):

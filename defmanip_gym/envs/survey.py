@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.task import TaskState
 from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
@@ -44,13 +44,13 @@ def goal_of(config: TransportConfig) -> Goal:
     )
 
 
-@compiled
+@compilable
 def wrapped(angle: float) -> float:
     """Return the angle in (−π, π]."""
     return angle - 2 * math.pi * math.ceil((angle - math.pi) / (2 * math.pi))
 
 
-@compiled
+@compilable
 def course_error(x: float, y: float, heading_error: float, blend_radius_m: float) -> float:
     """Return how far the robot is off the course that ends with the right heading, rad.
 
@@ -68,15 +68,15 @@ def course_error(x: float, y: float, heading_error: float, blend_radius_m: float
     return abs(wrapped(heading_error - share * wrapped(streamline_heading(x, y))))
 
 
-@compiled
-def survey(goal: Goal, plant: PlantState, i: int, observation: Array) -> TaskState:
+@compilable
+def survey(goal: Goal, plant: PlantState, i: int, observations: Array) -> TaskState:
     """Write an episode's observation without sensor noise and return what the task looks at.
 
     Args:
         goal: of the task.
         plant: the true state of n episodes.
         i: which of them.
-        observation: (size,), in the order of ``ObservationLayout``.
+        observations: (n, size), in the order of ``ObservationLayout``.
     """
     heading, upper = plant.base_pose[i, 2], plant.joints[i, 0]
     u1, u2 = plant.base_velocity[i, 0], plant.base_velocity[i, 1]
@@ -94,22 +94,22 @@ def survey(goal: Goal, plant: PlantState, i: int, observation: Array) -> TaskSta
     heading_error = wrapped(heading - goal.heading_rad)
     x, y = turned(-ahead, -aside, heading_error)
 
-    observation[0], observation[1], observation[2] = ahead, aside, above
-    observation[3], observation[4] = math.sin(heading_error), math.cos(heading_error)
-    observation[5], observation[6], observation[7] = forward, left, up
-    observation[8], observation[9] = u1, u2
+    observations[i, 0], observations[i, 1], observations[i, 2] = ahead, aside, above
+    observations[i, 3], observations[i, 4] = math.sin(heading_error), math.cos(heading_error)
+    observations[i, 5], observations[i, 6], observations[i, 7] = forward, left, up
+    observations[i, 8], observations[i, 9] = u1, u2
     largest_swing = 0.0
-    segments = plant.swing.shape[1]
+    _, segments = plant.swing.shape
     for k in range(2):
-        observation[10 + k] = plant.joints[i, k]
-        observation[12 + k] = plant.joint_rates[i, k]
+        observations[i, 10 + k] = plant.joints[i, k]
+        observations[i, 12 + k] = plant.joint_rates[i, k]
     for k in range(segments):
-        observation[14 + k] = plant.swing[i, k]
-        observation[14 + segments + k] = plant.swing_rate[i, k]
+        observations[i, 14 + k] = plant.swing[i, k]
+        observations[i, 14 + segments + k] = plant.swing_rate[i, k]
         largest_swing = max(largest_swing, abs(plant.swing[i, k]))
     for k in range(3):
-        observation[14 + 2 * segments + k] = plant.grasp_force_b[i, k]
-        observation[17 + 2 * segments + k] = math.tanh(observation[k] / NEAR_OFFSET_SCALE_M)
+        observations[i, 14 + 2 * segments + k] = plant.grasp_force_b[i, k]
+        observations[i, 17 + 2 * segments + k] = math.tanh(observations[i, k] / NEAR_OFFSET_SCALE_M)
 
     return TaskState(
         distance_m=math.sqrt(ahead**2 + aside**2 + above**2),
@@ -124,7 +124,7 @@ def survey(goal: Goal, plant: PlantState, i: int, observation: Array) -> TaskSta
 @compiled
 def _observations(goal: Goal, plant: PlantState, observations: Array) -> None:
     for i in range(len(observations)):
-        survey(goal, plant, i, observations[i])
+        survey(goal, plant, i, observations)
 
 
 def clean_observations(config: TransportConfig, plant: PlantState) -> Array:

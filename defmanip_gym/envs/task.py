@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 from typing import NamedTuple
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable
 from defmanip_gym.envs.config import TransportConfig
 
 
@@ -105,7 +105,7 @@ def task_of(config: TransportConfig) -> Task:
     )
 
 
-@compiled
+@compilable
 def tolerance_shares(state: TaskState, task: Task) -> tuple[float, float, float, float]:
     """Return each error over its tolerance: distance, speed, swing, heading."""
     return (
@@ -116,19 +116,20 @@ def tolerance_shares(state: TaskState, task: Task) -> tuple[float, float, float,
     )
 
 
-@compiled
+@compilable
 def is_success(state: TaskState, task: Task) -> bool:
     """Whether all four errors are within their tolerances."""
-    return max(tolerance_shares(state, task)) < 1.0
+    position, speed, swing, heading = tolerance_shares(state, task)
+    return position < 1.0 and speed < 1.0 and swing < 1.0 and heading < 1.0
 
 
-@compiled
+@compilable
 def constraint_margin(state: TaskState, task: Task) -> float:
     """Return σ − ‖z2‖∞ in rad; negative where Eq. (9) is violated."""
     return task.sigma_rad - state.largest_swing_rad
 
 
-@compiled
+@compilable
 def potentials(state: TaskState, task: Task) -> Potentials:
     """Return the shaping potentials.
 
@@ -152,14 +153,14 @@ def potentials(state: TaskState, task: Task) -> Potentials:
     )
 
 
-@compiled
+@compilable
 def is_failure(outcome: Outcome, margin_rad: float, task: Task) -> bool:
     """Whether the episode ended for a reason nobody wants."""
     violated = task.violation_ends and margin_rad < 0
     return outcome.left_workspace or outcome.simulation_failed or violated
 
 
-@compiled
+@compilable
 def reward_terms(
     before: Potentials,
     after: Potentials,

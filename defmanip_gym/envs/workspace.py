@@ -45,7 +45,7 @@ def workspace_of(config: TransportConfig) -> Workspace:
         smallest_grasp_height_m=task.smallest_grasp_height_m,
     )
     goal = np.array(task.goal)
-    if not in_workspace(goal[:3], goal[3], goal[3] + goal[4], space):
+    if not in_workspace(goal[0], goal[1], goal[3], goal[3] + goal[4], space):
         raise ParameterError(
             "task.goal",
             task.goal,
@@ -56,20 +56,22 @@ def workspace_of(config: TransportConfig) -> Workspace:
 
 
 @compilable
-def in_workspace(base_pose: Array, upper: Numbers, fore: Numbers, space: Workspace) -> Numbers:
+def in_workspace(
+    x: Numbers, y: Numbers, upper: Numbers, fore: Numbers, space: Workspace
+) -> Numbers:
     """Whether the base is in the arena and the arm clear of its singularities, (...).
 
     Args:
-        base_pose: (..., 3).
+        x: of the base, (...) m.
+        y: likewise.
         upper: α1, (...) rad.
         fore: α2, (...) rad; the elbow must point up, −π < α2 − α1 < 0.
         space: the workspace.
     """
-    x, y = base_pose[..., 0] - space.center_x_m, base_pose[..., 1] - space.center_y_m
     reach, height = reach_and_height(space.arm, upper, fore)
     elbow, bend = fore - upper, space.smallest_elbow_bend_rad
     return (
-        (np.hypot(x, y) < space.arena_radius_m)
+        (np.hypot(x - space.center_x_m, y - space.center_y_m) < space.arena_radius_m)
         & (elbow < -bend)
         & (elbow > bend - math.pi)
         & (reach > space.smallest_reach_m)

@@ -73,7 +73,9 @@ def read_state(
         force_s: on the object at the grasp, (n, 3) N in the frame of the first segment.
         state: to be filled in.
     """
-    for i in ids:
+    _, segments = state.swing.shape
+    for row in range(len(ids)):
+        i = ids[row]
         heading = position[i, 2]
         c, s = cos(heading), sin(heading)
         for k in range(3):
@@ -85,7 +87,7 @@ def read_state(
             state.joints[i, k] = position[i, 3 + k]
             state.joint_rates[i, k] = velocity[i, 3 + k]
         pitch, pitch_rate = position[i, 3] + position[i, 4], velocity[i, 3] + velocity[i, 4]
-        for k in range(state.swing.shape[1]):
+        for k in range(segments):
             pitch, pitch_rate = pitch + position[i, 5 + k], pitch_rate + velocity[i, 5 + k]
             state.swing[i, k], state.swing_rate[i, k] = pitch, pitch_rate
         # the first segment's frame is the base's, pitched by its swing

@@ -76,6 +76,9 @@ class Simulation:
         self._lead = machine_code(
             _lead_no_slip, self._position, self._velocity, self._period_s, self._lateral_target
         )
+        self._sense = machine_code(
+            _sense, self._all, self._position, np.empty((1, 3)), self._grasp_force_s
+        )
         self._conclude = machine_code(
             _conclude,
             self._readings,
@@ -143,8 +146,10 @@ class Simulation:
         """Put simulations at rest: ``pose`` (k, 3), ``joints`` (k, 2), ``swing`` (k, N)."""
         self._batch.state[ids] = self._pristine  # what Batch.reset does, at a fraction of its cost
         self._sentinel.arm(ids)
-        angles = np.concatenate((pose, joints, swing), axis=1, dtype=np.float64)
-        _place(ids, angles, self._position)
+        # a hinge turns relative to its parent
+        pitch = np.concatenate((joints[:, :1] + joints[:, 1:], swing), axis=1)
+        hinges = pitch[:, 1:] - pitch[:, :-1]
+        self._position[ids] = np.concatenate((pose, joints, hinges), axis=1)
 
     def move(
         self,
@@ -168,7 +173,7 @@ class Simulation:
 
     def report(self, ids: NDArray[np.intp], grasp_force_b: Array) -> None:
         """Let ``read`` report a known grasp force, (k, 3) N, until the next step."""
-        _sense(ids, self._position, grasp_force_b, self._grasp_force_s)
+        self._sense(ids, self._position, grasp_force_b, self._grasp_force_s)
 
     def hold(self, ids: NDArray[np.intp], generalized_forces: Array) -> None:
         """Set T_r of simulations, (k, 4), and compute the forces it causes, without stepping."""
@@ -240,21 +245,10 @@ def _lead_no_slip(position: Array, velocity: Array, period_s: float, target: Arr
 
 
 @compiled
-def _place(ids: NDArray[np.intp], angles: Array, position: Array) -> None:
-    """Write qpos, (n, 5 + N), for rows (x, y, θ, q_a, φ): a hinge turns relative to its parent."""
-    for row, i in enumerate(ids):
-        for k in range(5):
-            position[i, k] = angles[row, k]
-        pitch = angles[row, 3] + angles[row, 4]
-        for k in range(5, position.shape[1]):
-            position[i, k] = angles[row, k] - pitch
-            pitch = angles[row, k]
-
-
-@compiled
 def _sense(ids: NDArray[np.intp], position: Array, force_b: Array, force_s: Array) -> None:
     """Write forces in the base frame as the sensor in the first segment's frame reads them."""
-    for row, i in enumerate(ids):
+    for row in range(len(ids)):
+        i = ids[row]
         swing = position[i, 3] + position[i, 4] + position[i, 5]
         c, s = cos(swing), sin(swing)
         force_s[i, 0] = c * force_b[row, 0] + s * force_b[row, 2]
@@ -276,11 +270,14 @@ def _conclude(
     forward pass after each period would cost a fifth of the physics. The last two readings, under
     the same controls, give the force of this instant to O(h²).
     """
-    last = readings.shape[1] - 1
+    _, substeps, _ = readings.shape
+    _, size = velocity.shape
+    last = substeps - 1
+    previous = last - 1 if last > 0 else 0
     for i in range(len(force)):
         for k in range(3):
-            force[i, k] = 2 * readings[i, last, k] - readings[i, max(last - 1, 0), k]
-        for k in range(velocity.shape[1]):
+            force[i, k] = 2 * readings[i, last, k] - readings[i, previous, k]
+        for k in range(size):
             if not abs(velocity[i, k]) < _FASTEST:
                 sentinel[i] = 0
         failed[i] = sentinel[i] == 0

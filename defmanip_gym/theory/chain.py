@@ -12,12 +12,13 @@ on two constants: p_j = Σ_i m_i A_ij and W_jk = Σ_i m_i A_ij A_ik.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, LinkParams, RobotParams
 
 Array = NDArray[np.float64]
@@ -124,14 +125,16 @@ class YawingChain:
         """Return M(α), (..., 2 + L, 2 + L), for v = (u1, u2, α̇); ``alpha`` (..., L) rad."""
         size = 2 + self.link_count
         matrix = np.empty((*np.shape(alpha)[:-1], size, size))
-        _mass_matrices(self.constants, _rows(alpha), matrix.reshape(-1, size, size))
+        cosine, sine = np.empty(self.link_count), np.empty(self.link_count)
+        _mass_matrices(self.constants, _rows(alpha), cosine, sine, matrix.reshape(-1, size, size))
         return matrix
 
     def velocity_bias(self, alpha: Array, velocity: Array) -> Array:
         """Return h(α, v) without gravity, (..., 2 + L); ``velocity`` is v, (..., 2 + L)."""
         rows = _rows(velocity)
         bias = np.empty_like(rows)
-        _velocity_biases(self.constants, _rows(alpha), rows, bias)
+        cosine, sine = np.empty(self.link_count), np.empty(self.link_count)
+        _velocity_biases(self.constants, _rows(alpha), rows, cosine, sine, bias)
         return bias.reshape(np.shape(velocity))
 
     def gravity_torque(self, alpha: Array) -> Array:
@@ -145,7 +148,7 @@ class YawingChain:
         return bias
 
 
-@compiled
+@compilable
 def mass_matrix_at(chain: ChainConstants, cosine: Array, sine: Array, M: Array) -> None:
     """Write M(α) of one state into ``M``, (2 + L, 2 + L).
 
@@ -169,7 +172,7 @@ def mass_matrix_at(chain: ChainConstants, cosine: Array, sine: Array, M: Array) 
     M[0, 0], M[1, 1], M[0, 1], M[1, 0] = chain.total_mass, yaw_inertia, 0.0, 0.0
 
 
-@compiled
+@compilable
 def velocity_bias_at(
     chain: ChainConstants, cosine: Array, sine: Array, velocity: Array, h: Array
 ) -> None:
@@ -183,52 +186,67 @@ def velocity_bias_at(
         h: the result.
     """
     p, W = chain.first_moments, chain.second_moments
-    u1, u2, alpha_dot = velocity[0], velocity[1], velocity[2:]
+    u1, u2 = velocity[0], velocity[1]
     h[0] = coriolis = 0.0
     for j in range(len(cosine)):
-        h[0] -= p[j] * cosine[j] * (alpha_dot[j] ** 2 + u2**2)
+        h[0] -= p[j] * cosine[j] * (velocity[2 + j] ** 2 + u2**2)
         slope = (chain.axial[j] - chain.transverse[j]) * sine[j] * cosine[j]
-        coriolis += p[j] * cosine[j] * u1 + 2 * slope * alpha_dot[j]
+        coriolis += p[j] * cosine[j] * u1 + 2 * slope * velocity[2 + j]
         h[2 + j] = -slope * u2**2
         for k in range(len(cosine)):
-            coriolis -= 2 * W[j, k] * cosine[j] * sine[k] * alpha_dot[k]
+            coriolis -= 2 * W[j, k] * cosine[j] * sine[k] * velocity[2 + k]
             h[2 + j] += W[j, k] * sine[j] * cosine[k] * u2**2
             # sin(α_j − α_k)
             turned = sine[j] * cosine[k] - cosine[j] * sine[k]
-            h[2 + j] += W[j, k] * turned * alpha_dot[k] ** 2
+            h[2 + j] += W[j, k] * turned * velocity[2 + k] ** 2
     h[1] = u2 * coriolis
 
 
-@compiled
-def solve_positive_definite(A: Array, b: Array) -> None:
-    """Turn b (k,) into A⁻¹ b by elimination, A (k, k) into its triangular factor.
+@compilable
+def solve_positive_definite(A: Array, b: Array, first: int) -> None:
+    """Turn b into A⁻¹ b by elimination, A into its triangular factor, from row ``first`` on.
 
     Positive definite matrices need no pivots; LAPACK's solver costs more than all the rest here.
+
+    Args:
+        A: its block from row and column ``first`` on counts, (k, k).
+        b: right-hand side and result, (k,).
+        first: 0 for all of them.
     """
-    for j in range(len(b)):
+    for j in range(first, len(b)):
         for i in range(j + 1, len(b)):
             factor = A[i, j] / A[j, j]
             b[i] -= factor * b[j]
             for k in range(j, len(b)):
                 A[i, k] -= factor * A[j, k]
-    for j in range(len(b) - 1, -1, -1):
+    for j in range(len(b) - 1, first - 1, -1):
         for k in range(j + 1, len(b)):
             b[j] -= A[j, k] * b[k]
         b[j] /= A[j, j]
 
 
 @compiled
-def _mass_matrices(chain: ChainConstants, alpha: Array, M: Array) -> None:
-    cosine, sine = np.cos(alpha), np.sin(alpha)
+def _mass_matrices(
+    chain: ChainConstants, alpha: Array, cosine: Array, sine: Array, M: Array
+) -> None:
     for i in range(len(alpha)):
-        mass_matrix_at(chain, cosine[i], sine[i], M[i])
+        _directions(alpha[i], cosine, sine)
+        mass_matrix_at(chain, cosine, sine, M[i])
 
 
 @compiled
-def _velocity_biases(chain: ChainConstants, alpha: Array, velocity: Array, h: Array) -> None:
-    cosine, sine = np.cos(alpha), np.sin(alpha)
+def _velocity_biases(
+    chain: ChainConstants, alpha: Array, velocity: Array, cosine: Array, sine: Array, h: Array
+) -> None:
     for i in range(len(alpha)):
-        velocity_bias_at(chain, cosine[i], sine[i], velocity[i], h[i])
+        _directions(alpha[i], cosine, sine)
+        velocity_bias_at(chain, cosine, sine, velocity[i], h[i])
+
+
+@compilable
+def _directions(alpha: Array, cosine: Array, sine: Array) -> None:
+    for j in range(len(alpha)):
+        cosine[j], sine[j] = cos(alpha[j]), sin(alpha[j])
 
 
 def _rows(values: Array) -> Array:

@@ -7,7 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.theory.chain import Array
 from defmanip_gym.validation import require_non_negative, settle
 
@@ -76,21 +76,39 @@ def limit_speed(w: Array, velocity: Array, max_speed: float, period_s: float) ->
     return limited
 
 
-@compiled
-def limit_speed_at(w: Array, velocity: Array, max_speed: float, period_s: float) -> None:
-    """Do so for one state, (3,), in place."""
-    squared_now = squared_ahead = 0.0
-    for k in range(3):
-        squared_now += velocity[k] ** 2
-        squared_ahead += (velocity[k] + period_s * w[k]) ** 2
-    speed_ahead, allowed = sqrt(squared_ahead), max(max_speed, sqrt(squared_now))
+@compilable
+def limited_acceleration(
+    w_x: float,
+    w_y: float,
+    w_z: float,
+    v_x: float,
+    v_y: float,
+    v_z: float,
+    max_speed: float,
+    period_s: float,
+) -> tuple[float, float, float]:
+    """Return w of one state, limited so, by its components and those of the velocity."""
+    ahead_x, ahead_y, ahead_z = v_x + period_s * w_x, v_y + period_s * w_y, v_z + period_s * w_z
+    speed_ahead = sqrt(ahead_x**2 + ahead_y**2 + ahead_z**2)
+    allowed = max(max_speed, sqrt(v_x**2 + v_y**2 + v_z**2))
     if speed_ahead > allowed:
         shrink = allowed / speed_ahead
-        for k in range(3):
-            w[k] = ((velocity[k] + period_s * w[k]) * shrink - velocity[k]) / period_s
+        w_x = (ahead_x * shrink - v_x) / period_s
+        w_y = (ahead_y * shrink - v_y) / period_s
+        w_z = (ahead_z * shrink - v_z) / period_s
+    return w_x, w_y, w_z
 
 
 @compiled
 def _limit_speeds(w: Array, velocity: Array, max_speed: float, period_s: float) -> None:
     for i in range(len(w)):
-        limit_speed_at(w[i], velocity[i], max_speed, period_s)
+        w[i, 0], w[i, 1], w[i, 2] = limited_acceleration(
+            w[i, 0],
+            w[i, 1],
+            w[i, 2],
+            velocity[i, 0],
+            velocity[i, 1],
+            velocity[i, 2],
+            max_speed,
+            period_s,
+        )

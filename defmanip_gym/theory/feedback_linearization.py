@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.chain import (
     Array,
@@ -29,6 +29,43 @@ class NominalModel(NamedTuple):
     rule: ReachRule
     d_o22: Array
     k_o22: Array
+
+
+class StateRoom(NamedTuple):
+    """Where one state of the chain of L = 2 + N links is put, and the terms of Eq. (7) for it.
+
+    Attributes:
+        swing: φ, (N,) rad.
+        velocity: v = (u1, u2, α̇), (2 + L,).
+        acceleration: v̇, (2 + L,).
+        cosine: cos α, (L,).
+        sine: sin α, (L,).
+        M: (2 + L, 2 + L).
+        h: (2 + L,).
+    """
+
+    swing: Array
+    velocity: Array
+    acceleration: Array
+    cosine: Array
+    sine: Array
+    M: Array
+    h: Array
+
+    @classmethod
+    def empty(cls, segments: int) -> StateRoom:
+        """Return room for a robot with a beam of N segments."""
+        links = 2 + segments
+        size = 2 + links
+        return cls(
+            swing=np.empty(segments),
+            velocity=np.empty(size),
+            acceleration=np.empty(size),
+            cosine=np.empty(links),
+            sine=np.empty(links),
+            M=np.empty((size, size)),
+            h=np.empty(size),
+        )
 
 
 class FeedbackLinearization:
@@ -81,37 +118,84 @@ class FeedbackLinearization:
             np.ascontiguousarray(base_velocity),
             np.ascontiguousarray(swing),
             np.ascontiguousarray(swing_rate),
+            StateRoom.empty(swing.shape[1]),
             forces,
         )
         return forces
 
 
-@compiled
+@compilable
 def generalized_forces_at(
     model: NominalModel,
-    w: Array,
-    joints: Array,
-    joint_rates: Array,
-    base_velocity: Array,
-    swing: Array,
-    swing_rate: Array,
+    w_forward: float,
+    w_left: float,
+    w_up: float,
+    upper: float,
+    fore: float,
+    state: StateRoom,
     forces: Array,
+    i: int,
 ) -> None:
-    """Write T_r for one state into ``forces``, (4,); arguments as above without the n."""
-    links = 2 + len(swing)
-    alpha, cosine, sine = np.empty(links), np.empty(links), np.empty(links)
-    velocity, M, h = np.empty(2 + links), np.empty((2 + links, 2 + links)), np.empty(2 + links)
-    alpha[0], alpha[1] = joints[0], joints[0] + joints[1]
-    velocity[0], velocity[1] = base_velocity[0], base_velocity[1]
-    velocity[2], velocity[3] = joint_rates[0], joint_rates[0] + joint_rates[1]
-    for j in range(len(swing)):
-        alpha[2 + j], velocity[4 + j] = hanging_pitch(swing[j]), swing_rate[j]
-    for j in range(links):
-        cosine[j], sine[j] = cos(alpha[j]), sin(alpha[j])
+    """Write T_r for one state into row i of ``forces``, (n, 4).
+
+    Args:
+        model: what is believed.
+        w_forward: task-space acceleration, m/s², base frame.
+        w_left: to the left.
+        w_up: and upwards.
+        upper: α1, rad.
+        fore: α2, rad.
+        state: swing and velocity filled in; the rest is written.
+        forces: the result.
+        i: its row.
+    """
+    velocity, acceleration = state.velocity, state.acceleration
+    cosine, sine, M, h = state.cosine, state.sine, state.M, state.h
+    cosine[0], sine[0] = cos(upper), sin(upper)
+    cosine[1], sine[1] = cos(fore), sin(fore)
+    for j in range(len(state.swing)):
+        alpha = hanging_pitch(state.swing[j])
+        cosine[2 + j], sine[2 + j] = cos(alpha), sin(alpha)
     mass_matrix_at(model.chain, cosine, sine, M)
     velocity_bias_at(model.chain, cosine, sine, velocity, h)
-    _add_position_forces(model, cosine, swing, swing_rate, h)
-    _inverse_dynamics(model, w, alpha, velocity, M, h, forces)
+    _add_position_forces(model, cosine, state.swing, velocity, h)
+    # the grasp gets the acceleration w, and the beam moves as it must
+    acceleration[0], acceleration[1], acceleration[2], acceleration[3] = shared_acceleration(
+        model.arm,
+        model.rule,
+        w_forward,
+        w_left,
+        w_up,
+        upper,
+        fore,
+        velocity[2],
+        velocity[3],
+        velocity[0],
+        velocity[1],
+    )
+    for j in range(4, len(h)):
+        acceleration[j] = -h[j]
+        for k in range(4):
+            acceleration[j] -= M[j, k] * acceleration[k]
+    solve_positive_definite(M, acceleration, 4)
+    for j in range(4):
+        forces[i, j] = h[j]
+        for k in range(len(h)):
+            forces[i, j] += M[j, k] * acceleration[k]
+    # from forces conjugate to α̇ to torques conjugate to q̇_a
+    forces[i, 2] += forces[i, 3]
+
+
+@compilable
+def _add_position_forces(
+    model: NominalModel, cosine: Array, swing: Array, velocity: Array, h: Array
+) -> None:
+    """Complete h of Eq. (7): gravity, the beam's dampers and springs."""
+    for j in range(len(cosine)):
+        h[2 + j] += GRAVITY_M_S2 * model.chain.first_moments[j] * cosine[j]
+    for j in range(len(swing)):
+        for k in range(len(swing)):
+            h[4 + j] += model.d_o22[j, k] * velocity[4 + k] + model.k_o22[j, k] * swing[k]
 
 
 @compiled
@@ -123,58 +207,24 @@ def _generalized_forces(
     base_velocity: Array,
     swing: Array,
     swing_rate: Array,
+    state: StateRoom,
     forces: Array,
 ) -> None:
+    _, segments = swing.shape
     for i in range(len(w)):
+        upper, upper_rate = joints[i, 0], joint_rates[i, 0]
+        state.velocity[0], state.velocity[1] = base_velocity[i, 0], base_velocity[i, 1]
+        state.velocity[2], state.velocity[3] = upper_rate, upper_rate + joint_rates[i, 1]
+        for k in range(segments):
+            state.swing[k], state.velocity[4 + k] = swing[i, k], swing_rate[i, k]
         generalized_forces_at(
             model,
-            w[i],
-            joints[i],
-            joint_rates[i],
-            base_velocity[i],
-            swing[i],
-            swing_rate[i],
-            forces[i],
+            w[i, 0],
+            w[i, 1],
+            w[i, 2],
+            upper,
+            upper + joints[i, 1],
+            state,
+            forces,
+            i,
         )
-
-
-@compiled
-def _add_position_forces(
-    model: NominalModel, cosine: Array, swing: Array, swing_rate: Array, h: Array
-) -> None:
-    """Complete h of Eq. (7): gravity, the beam's dampers and springs."""
-    for j in range(len(cosine)):
-        h[2 + j] += GRAVITY_M_S2 * model.chain.first_moments[j] * cosine[j]
-    for j in range(len(swing)):
-        for k in range(len(swing)):
-            h[4 + j] += model.d_o22[j, k] * swing_rate[k] + model.k_o22[j, k] * swing[k]
-
-
-@compiled
-def _inverse_dynamics(
-    model: NominalModel,
-    w: Array,
-    alpha: Array,
-    velocity: Array,
-    M: Array,
-    h: Array,
-    forces: Array,
-) -> None:
-    """Write the T_r that gives the grasp the acceleration w; the beam moves as it must.
-
-    Overwrites the beam's part of M and h.
-    """
-    actuated = shared_acceleration(model.arm, model.rule, w, alpha[:2], velocity[2:4], velocity[:2])
-    for j in range(4, len(h)):
-        h[j] = -h[j]
-        for k in range(4):
-            h[j] -= M[j, k] * actuated[k]
-    solve_positive_definite(M[4:, 4:], h[4:])
-    for j in range(4):
-        forces[j] = h[j]
-        for k in range(4):
-            forces[j] += M[j, k] * actuated[k]
-        for k in range(4, len(h)):
-            forces[j] += M[j, k] * h[k]
-    # from forces conjugate to α̇ to torques conjugate to q̇_a
-    forces[2] += forces[3]

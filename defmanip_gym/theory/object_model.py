@@ -160,9 +160,16 @@ class HangingBeam:
 
 @compiled
 def held_forces(
-    chain: ChainConstants, k_o22: Array, mass_share: Array, length_share: Array, swing: Array
-) -> Array:
-    """Return the force (10) on beams at rest whose grasp is held still, (n, 3) N.
+    chain: ChainConstants,
+    k_o22: Array,
+    mass_share: Array,
+    length_share: Array,
+    swing: Array,
+    inertia: Array,
+    acceleration: Array,
+    force: Array,
+) -> None:
+    """Write the force (10) on beams at rest whose grasp is held still.
 
     Args:
         chain: constants of the reference beam.
@@ -170,23 +177,24 @@ def held_forces(
         mass_share: mass of each beam over the reference beam's, (n,).
         length_share: its length over the reference beam's, (n,).
         swing: φ, (n, N) rad.
+        inertia: room for m_o22 of one beam, (N, N).
+        acceleration: and for φ̈, (N,).
+        force: the result in the base frame, (n, 3) N.
     """
     count, segments = swing.shape
-    force = np.zeros((count, 3))
-    inertia, acceleration = np.empty((segments, segments)), np.empty(segments)
     for i in range(count):
-        mass, length, phi = mass_share[i], length_share[i], swing[i]
+        mass, length = mass_share[i], length_share[i]
         for j in range(segments):
             moment = mass * length * chain.first_moments[j]
-            acceleration[j] = -GRAVITY_M_S2 * moment * sin(phi[j])
+            acceleration[j] = -GRAVITY_M_S2 * moment * sin(swing[i, j])
             for k in range(segments):
-                acceleration[j] -= k_o22[j, k] * phi[k]
-                coupling = chain.second_moments[j, k] * cos(phi[j] - phi[k])
+                acceleration[j] -= k_o22[j, k] * swing[i, k]
+                coupling = chain.second_moments[j, k] * cos(swing[i, j] - swing[i, k])
                 inertia[j, k] = mass * length**2 * (coupling + chain.constant_inertia[j, k])
-        solve_positive_definite(inertia, acceleration)
+        solve_positive_definite(inertia, acceleration, 0)
+        force[i, 0] = force[i, 1] = 0.0
         force[i, 2] = GRAVITY_M_S2 * mass * chain.total_mass
         for j in range(segments):
             moment = mass * length * chain.first_moments[j]
-            force[i, 0] += moment * cos(phi[j]) * acceleration[j]
-            force[i, 2] += moment * sin(phi[j]) * acceleration[j]
-    return force
+            force[i, 0] += moment * cos(swing[i, j]) * acceleration[j]
+            force[i, 2] += moment * sin(swing[i, j]) * acceleration[j]

@@ -18,6 +18,7 @@ from defmanip_gym.theory.chain import Array
 from defmanip_gym.theory.robot_model import (
     ArmKinematics,
     ArmLengths,
+    components,
     reach_and_height,
     reach_and_height_bias,
     reach_and_height_slopes,
@@ -51,26 +52,28 @@ class ReachRule(NamedTuple):
 def shared_acceleration(
     arm: ArmLengths,
     rule: ReachRule,
-    w: Array,
-    pitch: Array,
-    pitch_rate: Array,
-    base_velocity: Array,
+    w_forward: Numbers,
+    w_left: Numbers,
+    w_up: Numbers,
+    upper: Numbers,
+    fore: Numbers,
+    upper_rate: Numbers,
+    fore_rate: Numbers,
+    u1: Numbers,
+    u2: Numbers,
 ) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Return u̇1, u̇2, α̈1, α̈2, (...) each; see ``RedundancyResolution.accelerations``."""
-    u1, u2 = base_velocity[..., 0], base_velocity[..., 1]
-    upper, fore = pitch[..., 0], pitch[..., 1]
-    upper_rate, fore_rate = pitch_rate[..., 0], pitch_rate[..., 1]
-    reach = reach_and_height(arm, upper, fore)[0]
+    reach, _ = reach_and_height(arm, upper, fore)
     rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
     reach_rate = rho_1 * upper_rate + rho_2 * fore_rate
     reach_acceleration = -rule.k3 * (reach_rate + rule.k * (reach - rule.goal_reach_m))
     reach_bias, height_bias = reach_and_height_bias(arm, upper, fore, upper_rate, fore_rate)
     # the arm realizes ρ̈ and w_z, the base the rest of w
-    along, up = reach_acceleration - reach_bias, w[..., 2] - height_bias
+    along, up = reach_acceleration - reach_bias, w_up - height_bias
     determinant = rho_1 * z_2 - rho_2 * z_1
     return (
-        w[..., 0] - reach_acceleration + reach * u2**2,
-        (w[..., 1] - 2 * reach_rate * u2 - u1 * u2) / reach,
+        w_forward - reach_acceleration + reach * u2**2,
+        (w_left - 2 * reach_rate * u2 - u1 * u2) / reach,
         (z_2 * along - rho_2 * up) / determinant,
         (rho_1 * up - z_1 * along) / determinant,
     )
@@ -109,7 +112,12 @@ class RedundancyResolution:
         """
         return np.stack(
             shared_acceleration(
-                self.kinematics.lengths, self.rule, w, pitch, pitch_rate, base_velocity
+                self.kinematics.lengths,
+                self.rule,
+                *components(w),
+                *components(pitch),
+                *components(pitch_rate),
+                *components(base_velocity),
             ),
             axis=-1,
         )

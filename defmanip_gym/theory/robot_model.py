@@ -82,8 +82,8 @@ def grasp_velocity(
     """Return ẋ_a = J_A u, Eq. (1), in the base frame: forward, left and up, (...) m/s each."""
     rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
     forward = u1 + rho_1 * upper_rate + rho_2 * fore_rate
-    left = reach_and_height(arm, upper, fore)[0] * u2
-    return forward, left, z_1 * upper_rate + z_2 * fore_rate
+    reach, _ = reach_and_height(arm, upper, fore)
+    return forward, reach * u2, z_1 * upper_rate + z_2 * fore_rate
 
 
 class ArmKinematics:
@@ -98,17 +98,18 @@ class ArmKinematics:
 
     def reach_and_height(self, pitch: Array) -> Array:
         """Return (ρ, z), shape (..., 2) in m, of the grasp for pitches (..., 2) in rad."""
-        return np.stack(reach_and_height(self.lengths, *_each(pitch)), axis=-1)
+        return np.stack(reach_and_height(self.lengths, *components(pitch)), axis=-1)
 
     def jacobian(self, pitch: Array) -> Array:
         """Return d(ρ, z)/dα, shape (..., 2, 2), in m/rad."""
-        slopes = np.stack(reach_and_height_slopes(self.lengths, *_each(pitch)), axis=-1)
+        slopes = np.stack(reach_and_height_slopes(self.lengths, *components(pitch)), axis=-1)
         return slopes.reshape(*slopes.shape[:-1], 2, 2)
 
     def bias_acceleration(self, pitch: Array, pitch_rate: Array) -> Array:
         """Return (ρ̈, z̈) at α̈ = 0, shape (..., 2) in m/s²."""
         return np.stack(
-            reach_and_height_bias(self.lengths, *_each(pitch), *_each(pitch_rate)), axis=-1
+            reach_and_height_bias(self.lengths, *components(pitch), *components(pitch_rate)),
+            axis=-1,
         )
 
     def task_jacobian(self, pitch: Array) -> Array:
@@ -138,8 +139,9 @@ class ArmKinematics:
         )
 
 
-def _each(pair: Array) -> tuple[Array, Array]:
-    return pair[..., 0], pair[..., 1]
+def components(vectors: Array) -> tuple[Array, ...]:
+    """Return the components, (...) each, of vectors (..., k)."""
+    return tuple(np.moveaxis(vectors, -1, 0))
 
 
 def robot_chain(robot: RobotParams, beam: BeamParams | None = None) -> YawingChain:

@@ -128,9 +128,9 @@ class _Search:
     def _advance(self, command: Array, before: GraspMotion) -> tuple[GraspMotion, Array]:
         """Step a control period; return the motion at its end and the mean stray, (n,) m/s."""
         task, simulation = self._config.task, self._simulation
-        actions = self._inner_loop.clipped(command / task.max_acceleration_m_s2)
-        state = simulation.read()
-        self._inner_loop.write_forces(actions, state, simulation.generalized_forces)
+        self._inner_loop.write_forces(
+            command / task.max_acceleration_m_s2, simulation.read(), simulation.generalized_forces
+        )
         if self._config.disturbance.has_force:
             simulation.push_grasp(disturbing_force(self._config, self._steps))
         at_a_time = -(-task.substeps // _READINGS)
