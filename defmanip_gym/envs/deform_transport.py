@@ -160,25 +160,6 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
-        gymnasium.utils.EzPickle.__init__(
-            self,
-            render_mode=render_mode,
-            width=width,
-            height=height,
-            camera_id=camera_id,
-            camera_name=camera_name,
-            default_camera_config=default_camera_config,
-            control_mode=control_mode,
-            constraint_mode=constraint_mode,
-            sigma_rad=sigma_rad,
-            robot=robot,
-            beam=beam,
-            beam_ranges=beam_ranges,
-            nominal_robot=nominal_robot,
-            nominal_beam=nominal_beam,
-            task=task,
-            disturbance=disturbance,
-        )
         if render_mode is not None:
             require_choice("render_mode", render_mode, RENDER_MODES)
         view = ViewParams(

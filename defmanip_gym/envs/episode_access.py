@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import Any, Self
 
-import gymnasium
 import mujoco
 
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.validation import require_whole
 
 
-class EpisodeAccess(gymnasium.utils.EzPickle):
+class EpisodeAccess:
     """Mixed into environments that have an ``engine``.
 
     Copies and pickles are made from the constructor's arguments, and go on from the same state.
@@ -20,6 +19,13 @@ class EpisodeAccess(gymnasium.utils.EzPickle):
 
     engine: TransportEngine
     spec: Any
+    _arguments: tuple[tuple[Any, ...], dict[str, Any]]
+
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """Note what the environment is made with."""
+        made = super().__new__(cls)
+        made._arguments = args, kwargs
+        return made
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -72,10 +78,11 @@ class EpisodeAccess(gymnasium.utils.EzPickle):
         self.engine.set_state(state)
 
     def __getstate__(self) -> dict[str, Any]:
-        return super().__getstate__() | {"spec": self.spec, "state": self.get_state()}
+        return {"arguments": self._arguments, "spec": self.spec, "state": self.get_state()}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        super().__setstate__(kept)
+        args, kwargs = kept["arguments"]
+        self.__dict__.update(vars(type(self)(*args, **kwargs)))
         self.spec = kept["spec"]
         self.set_state(kept["state"])
 

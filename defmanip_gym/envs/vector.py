@@ -103,29 +103,6 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
     ) -> None:
-        gymnasium.utils.EzPickle.__init__(
-            self,
-            num_envs,
-            max_episode_steps=max_episode_steps,
-            autoreset_mode=autoreset_mode,
-            num_threads=num_threads,
-            render_mode=render_mode,
-            width=width,
-            height=height,
-            camera_id=camera_id,
-            camera_name=camera_name,
-            default_camera_config=default_camera_config,
-            control_mode=control_mode,
-            constraint_mode=constraint_mode,
-            sigma_rad=sigma_rad,
-            robot=robot,
-            beam=beam,
-            beam_ranges=beam_ranges,
-            nominal_robot=nominal_robot,
-            nominal_beam=nominal_beam,
-            task=task,
-            disturbance=disturbance,
-        )
         num_envs = require_whole("num_envs", num_envs, 1, MOST_ENVS)
         max_episode_steps = require_whole("max_episode_steps", max_episode_steps, 1)
         num_threads = require_whole("num_threads", num_threads, 0, MOST_WORKERS)
