@@ -158,7 +158,9 @@ def run_case(seed: int, duration_s: float) -> dict[str, Any]:
     if has_own_room:
         certificate = certificate_for(env.unwrapped.config, method=method)
     else:
-        certificate = certify(arguments["beam"], method=method, conditions=TRANSPORT_CONDITIONS)
+        certificate = certify(
+            arguments["beam"], method=method, conditions=TRANSPORT_CONDITIONS
+        ).proven()
     wrapped = NuMaxVectorActionScaling(env, certificate)
     observation, info = wrapped.reset(seed=1000 * seed)
     promised = info["certificate_applies"].copy()

@@ -27,13 +27,15 @@ def certificate_for(
 ) -> Certificate:
     """Certify the beam of an environment, with as much room for errors as its robot makes.
 
+    The bound is what is proven for the nonlinear beam, since no other applies.
+
     Args:
         config: ``env.unwrapped.config``, in task mode.
         method: one of ``CERTIFICATE_METHODS``.
         conditions: of the motion; their room for errors is the least that is given.
 
     Raises:
-        CertificateError: errors and conditions alone use up σ, or there is no such certificate.
+        CertificateError: errors and conditions alone use up σ, or nothing is proven for this beam.
     """
     beams = config.beam_ranges.extremes(config.beam)
     weakest = min(beams, key=lambda beam: beam.damping)
@@ -46,7 +48,7 @@ def certificate_for(
             method=method,
             conditions=conditions,
             intervals=intervals,
-        )
+        ).proven()
         needed = realization_errors(config, certificate).room_m_s2
         if needed <= conditions.acceleration_error_m_s2:
             return certificate
