@@ -44,7 +44,8 @@ class CarriedBeams:
         self._simulation, self._generators = simulation, generators
         count = simulation.count
         self._all = np.arange(count)
-        self.values: Array = np.tile(_rows([config.beam]).T, count)
+        self._given = _rows([config.beam]).T
+        self.values: Array = np.tile(self._given, count)
         self._object = HangingBeam(config.beam)
         segments = config.beam.segment_count
         self._room = np.empty((segments, segments)), np.empty(segments)
@@ -60,8 +61,10 @@ class CarriedBeams:
         )
 
     def draw(self, ids: Ids) -> None:
-        """Let new episodes, (k,) increasing, have beams of their own."""
+        """Let new episodes, (k,) increasing, have beams of their own, or the given one again."""
         if self._ranges.is_empty:
+            if self._is_foreign:
+                self._carry(ids, [self._beam] * len(ids))
             return
         self._carry(ids, [self._ranges.sample(self._beam, self._generators[i]) for i in ids])
 
@@ -86,25 +89,29 @@ class CarriedBeams:
         return force_b
 
     def get_state(self) -> Array | None:
-        """Return the drawn beams' values, (n, 3), or None where none are drawn."""
-        return None if self._ranges.is_empty else self.values.T.copy()
+        """Return the beams' values, (n, 3), or None where all are the given one."""
+        return self.values.T.copy() if self._is_foreign else None
 
     def fitting(self, state: Any) -> list[BeamParams] | None:
-        """Return the beams of a state, n, or None where it has none.
+        """Return the beams of a state, n, or None where they are those carried now.
 
         Raises:
             StateError: it is of another number of episodes.
             ParameterError: it holds values that no beam has.
         """
-        if state is None:
-            return None
+        if state is None:  # of an environment that carried its given beam: this one's then
+            return [self._beam] * len(self._all) if self._is_foreign else None
         rows = fitted("state['beams']", state, self.values.T)
         return [replace(self._beam, **dict(zip(VARIED, row, strict=True))) for row in rows.tolist()]
 
     def set_state(self, beams: list[BeamParams] | None) -> None:
-        """Carry what ``fitting`` returned; what is carried now where it is None."""
+        """Carry what ``fitting`` returned."""
         if beams is not None:
             self._carry(self._all, beams)
+
+    @property
+    def _is_foreign(self) -> bool:
+        return bool((self.values != self._given).any())
 
     def _carry(self, ids: Ids, beams: list[BeamParams]) -> None:
         self._simulation.carry(ids, beams)

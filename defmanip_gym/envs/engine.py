@@ -26,6 +26,7 @@ from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.envs.survey import goal_of
 from defmanip_gym.envs.task import task_of
 from defmanip_gym.envs.workspace import workspace_of
+from defmanip_gym.errors import StateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.plant.simulation import Simulation
@@ -211,12 +212,16 @@ class TransportEngine:
         Raises:
             StateError: it does not fit; then nothing has changed.
         """
-        own = self.get_state() | {"beams": None, "noise": None}  # which need not be of this shape
+        checked_by_themselves = dict.fromkeys(("beams", "noise", "starts"))
+        own = self.get_state() | checked_by_themselves
         state = fitted("state", state, own)
+        if not isinstance(state["is_started"], bool):
+            raise StateError("state['is_started']", state["is_started"], "a bool", "See get_state.")
+        starts = self._starts.fitting(state["starts"])
         beams, noise = self._beams.fitting(state["beams"]), self._noise.fitting(state["noise"])
         self.generators.set_state(state["generators"])
         self._beams.set_state(beams)
-        self._starts.set_state(state["starts"])
+        self._starts.set_state(starts)
         self._noise.set_state(noise)
         self.simulation.set_state(state["simulation"])
         self._plant = PlantState(**state["plant"])
@@ -226,7 +231,7 @@ class TransportEngine:
             np.ascontiguousarray(state["numbers"].T),
         )
         self._steps = state["steps"]
-        self._is_started = bool(state["is_started"])
+        self._is_started = state["is_started"]
 
     def detach(self) -> None:
         """Go on with a copy of the last results, whatever becomes of those handed out."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from typing import Any, Self
 
 import mujoco
@@ -75,6 +76,8 @@ class EpisodeAccess:
         Raises:
             StateError: it is of other beam segments or another number of episodes.
         """
+        if isinstance(state, Mapping):  # of a batch, when it is this environment's n = 1
+            state = {key: value for key, value in state.items() if key != "ended"}
         self.engine.set_state(state)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -70,6 +70,13 @@ class EpisodeGenerators(Sequence[np.random.Generator]):
         if len(given) != len(self) or not all(isinstance(g, np.random.Generator) for g in given):
             allowed = f"{len(self)} of NumPy's Generators" if len(self) > 1 else "NumPy's Generator"
             raise SeedError("np_random", generators, allowed, "Make them by np.random.default_rng.")
+        if len({id(generator.bit_generator) for generator in given}) < len(given):
+            raise SeedError(
+                "np_random",
+                generators,
+                "a generator of its own for each episode",
+                "Make them by np.random.default_rng, or by spawn of one.",
+            )
         self._generators, self._seeds = given, [UNKNOWN_SEED] * len(given)
 
     def get_state(self) -> dict[str, Any]:

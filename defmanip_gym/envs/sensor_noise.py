@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.envs.state_tree import fitted
+from defmanip_gym.envs.state_tree import fitted, require_drawn
 from defmanip_gym.errors import StateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import DisturbanceParams
@@ -68,6 +68,7 @@ class SensorNoise:
             own["used"][:] = _STEPS_PER_DRAW
             return own
         fit: dict[str, Any] = fitted("state['noise']", state, own)
+        require_drawn("state['noise']['used']", fit["used"], _STEPS_PER_DRAW)
         return fit
 
     def set_state(self, state: dict[str, Any]) -> None:

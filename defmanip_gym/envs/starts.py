@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.state_tree import fitted, require_drawn
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
 from defmanip_gym.task_params import StartParams
@@ -78,6 +79,16 @@ class StartSampler:
     def get_state(self) -> dict[str, Any]:
         """Return what has been drawn, and how much of it is used."""
         return {"drawn": self._drawn.copy(), "used": self._used.copy()}
+
+    def fitting(self, state: Any) -> dict[str, Any]:
+        """Return a state for ``set_state``.
+
+        Raises:
+            StateError: it is of another number of episodes, or uses more than was drawn.
+        """
+        fit: dict[str, Any] = fitted("state['starts']", state, self.get_state())
+        require_drawn("state['starts']['used']", fit["used"], _STARTS_PER_DRAW)
+        return fit
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what ``get_state`` returned."""

@@ -39,6 +39,12 @@ def fitted(name: str, given: Any, own: Any) -> Any:
         raise StateError(f"{name}.shape", shape, f"{own.shape}", _REMEDY) from error
 
 
+def require_drawn(name: str, used: Any, drawn: int) -> None:
+    """Raise StateError unless each number of used draws, (n,), is from 0 to ``drawn``."""
+    if ((used < 0) | (used > drawn)).any():
+        raise StateError(name, used.tolist(), f"from 0 to {drawn}", _REMEDY)
+
+
 def _like(array: Any, own: Any) -> Any:
     if array.shape != own.shape:
         raise ValueError("another shape")

@@ -83,6 +83,8 @@ def test_what_is_no_generator_is_refused(make_batch):
     for wrong in (None, 3, np.random.RandomState(0)):
         with pytest.raises(SeedError, match="default_rng"):
             env.unwrapped.np_random = wrong
+    with pytest.raises(SeedError, match="of its own"):
+        batch.unwrapped.np_random = [one, one]
     for wrong in (one, [one], [one, 3], None):
         with pytest.raises(SeedError, match="2 of NumPy's Generators"):
             batch.unwrapped.np_random = wrong

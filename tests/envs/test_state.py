@@ -7,7 +7,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
-from gymnasium.wrappers import FrameStackObservation, NormalizeReward
+from gymnasium.wrappers import FrameStackObservation, NormalizeReward, TransformObservation
 from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 
 from defmanip_gym import get_state, set_state
@@ -283,3 +283,71 @@ def test_mujocos_fields_are_those_of_the_episode(make_batch):
         assert np.array_equal(drawn.get_data(i).qpos[:3], drawn.engine.plant_state.base_pose[i])
     with pytest.raises(ParameterError, match="index"):
         drawn.get_data(3)
+
+
+def test_a_beam_that_was_set_stays_in_copies_and_goes_with_the_episode():
+    drawn = gymnasium.make("defmanip_gym:DeformTransportRandomized-v0").unwrapped
+    drawn.reset(seed=0)
+    env = DeformTransportEnv()
+    _, info = env.reset(seed=1)
+    own, given = env.get_state(), info["beam_mass_kg"]
+    env.set_state(drawn.get_state())
+    assert env.step(np.ones(3))[4]["beam_mass_kg"] != given
+    twin = copy.deepcopy(env)
+    assert episodes(twin, 20) == episodes(env, 20)
+    assert env.reset(seed=1)[1]["beam_mass_kg"] == given
+    expected = episodes(env, 20)
+    env.set_state(drawn.get_state())
+    env.set_state(own)
+    assert episodes(env, 20) == expected
+
+
+def test_how_a_wrapper_was_made_is_not_part_of_its_memory():
+    def made(limit):
+        env = gymnasium.make(ENV_ID, max_episode_steps=limit)
+        return TransformObservation(env, lambda _: env.unwrapped.data.qpos, None)
+
+    short, long = made(10), made(1000)
+    short.reset(seed=0)
+    long.reset(seed=1)
+    episodes(short, 6)
+    set_state(long, pickle.loads(pickle.dumps(get_state(short))))
+    short.step(np.zeros(3))
+    moved, *_ = long.step(np.ones(3))
+    assert np.array_equal(moved, long.unwrapped.data.qpos)  # not the other's
+    ends = [bool(long.step(np.zeros(3))[3]) for _ in range(20)]
+    assert not any(ends)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("is_started",), np.zeros(3)),
+        (("starts", "used"), np.full(3, 99)),
+        (("noise", "used"), np.full(3, -1)),
+    ],
+)
+def test_damaged_states_change_nothing(path, value, make_batch):
+    env = make_batch(3, disturbance=NOISY)
+    env.reset(seed=0)
+    own = env.unwrapped.get_state()
+    damaged = copy.deepcopy(own)
+    inner = damaged
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    with pytest.raises(StateError):
+        env.unwrapped.set_state(damaged)
+    assert pickle.dumps(env.unwrapped.get_state()) == pickle.dumps(own)
+
+
+def test_damaged_memories_change_nothing():
+    env = NuMaxActionScaling(gymnasium.make(ENV_ID), CERTIFICATE)
+    env.reset(seed=0)
+    own = get_state(env)
+    for layer, memory in ((0, None), (0, {}), (1, {"_elapsed_steps": 3, "more": 1})):
+        damaged = copy.deepcopy(own)
+        damaged["wrappers"][layer]["memory"] = memory
+        with pytest.raises(StateError, match="memory of"):
+            set_state(env, damaged)
+        assert pickle.dumps(get_state(env)) == pickle.dumps(own)
