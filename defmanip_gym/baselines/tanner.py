@@ -115,14 +115,20 @@ class TannerController:
         params: TannerParams | None = None,
         require_stability: bool = True,
     ) -> None:
-        self.beam, self.robot = beam or BeamParams(), robot or RobotParams()
-        self.task, self.params = task or TaskParams(), params or TannerParams()
+        self.beam = BeamParams() if beam is None else require_params("beam", beam, BeamParams)
+        self.robot = RobotParams() if robot is None else require_params("robot", robot, RobotParams)
+        self.task = TaskParams() if task is None else require_params("task", task, TaskParams)
+        self.params = (
+            TannerParams() if params is None else require_params("params", params, TannerParams)
+        )
+        if certificate is not None:
+            certificate = require_params("certificate", certificate, Certificate)
         self.certificate = certificate
         self.layout = ObservationLayout(self.beam.segment_count)
         self.object = HangingBeam(self.beam, damping=self.params.force_law_damping)
         self.kinematics = ArmKinematics(self.robot)
         self._check_certificate()
-        if require_stability:
+        if require_flag("require_stability", require_stability):
             self._check_gains()
         self.bound, self.yaw_rate_bound, max_speed = self._bounds()
         self.field = self._velocity_field(max_speed)

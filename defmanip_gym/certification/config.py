@@ -83,7 +83,7 @@ class CertifyConfig:
     """Folder for the plot and the numbers."""
 
     def __post_init__(self) -> None:
-        validated_sigma(self.sigma)
+        object.__setattr__(self, "sigma", validated_sigma(self.sigma))
         settle(self, "transport", require_flag)
         settle(self, "attack", require_flag)
         settle(self, "longest_attack_s", require_number, 1.0, 3600.0, "s")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.episode_access import EpisodeAccess
+from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
 from defmanip_gym.envs.rendering.renderer import RENDER_MODES, TransportRenderer
 from defmanip_gym.envs.rendering.stage import Image
 from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
@@ -184,6 +184,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
             task=task,
             disturbance=disturbance,
         )
+        self.metadata = {**type(self).metadata, "render_fps": frames_per_second(self.config)}
         self.engine = TransportEngine(self.config, num_envs=1)
         self.observation_space = observation_space(self.engine)
         self.action_space = action_space(self.engine)

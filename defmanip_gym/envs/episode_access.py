@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from dataclasses import replace
+from enum import Enum
 from typing import Any, Self
 
 import mujoco
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.validation import require_whole
 
@@ -19,7 +24,7 @@ class EpisodeAccess:
     """
 
     engine: TransportEngine
-    spec: Any
+    _spec: EnvSpec | None = None
     _arguments: tuple[tuple[Any, ...], dict[str, Any]]
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
@@ -27,6 +32,15 @@ class EpisodeAccess:
         made = super().__new__(cls)
         made._arguments = args, kwargs
         return made
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made it, in values that JSON holds."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and replace(spec, kwargs=_without_numpy(spec.kwargs))
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -95,3 +109,21 @@ class EpisodeAccess:
         data = mujoco.MjData(model)
         self.engine.simulation.materialize(index, model, data)
         return model, data
+
+
+def frames_per_second(config: TransportConfig) -> int:
+    """Return how many images a second show an episode at its own speed."""
+    return max(1, round(1 / config.task.control_period_s))
+
+
+def _without_numpy(value: Any) -> Any:
+    """Return arguments with Python's own numbers and lists, as JSON has no others."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _without_numpy(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_without_numpy(each) for each in value)
+    return value

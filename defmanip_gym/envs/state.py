@@ -75,6 +75,6 @@ def _episodes(env: Any) -> Any:
             "env",
             env,
             "a DeformTransport environment",
-            "Of several in one vector environment, ask each: envs.call('get_state').",
+            "Use make_vec, whose batch is one environment, or ask the single ones.",
         )
     return episodes

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
-from defmanip_gym.envs.episode_access import EpisodeAccess
+from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
 from defmanip_gym.envs.rendering.renderer import IMAGE_MODES, TransportRenderer
 from defmanip_gym.envs.rendering.stage import Image
@@ -122,7 +122,6 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         if not isinstance(autoreset_mode, AutoresetMode):
             require_choice("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
         self.config = TransportConfig(
             control_mode=control_mode,
             constraint_mode=constraint_mode,
@@ -135,6 +134,11 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
             task=task,
             disturbance=disturbance,
         )
+        self.metadata = {
+            **type(self).metadata,
+            "render_fps": frames_per_second(self.config),
+            "autoreset_mode": self.autoreset_mode,
+        }
         self.engine = TransportEngine(
             self.config,
             num_envs,

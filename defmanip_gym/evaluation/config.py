@@ -72,7 +72,7 @@ class ComparisonConfig:
             require_choice("suites", name, (*SUITE_NAMES, _ALL))
         for name in ("episodes", "members"):
             value = getattr(self, name)
-            if value != _ALL:
+            if not (isinstance(value, str) and value == _ALL):
                 settle(self, name, require_whole, 1)
         if self.normalization is not None and not (self.allow_pickle and len(self.agents) == 1):
             raise ParameterError(

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Literal
 
 from defmanip_gym.errors import CertificateError, ParameterError
-from defmanip_gym.params import BeamParams
+from defmanip_gym.params import BeamParams, validated_sigma
 from defmanip_gym.theory.conditions import CertificateConditions, ParameterIntervals
 from defmanip_gym.theory.limits import nonlinear_limit
 from defmanip_gym.theory.zero_dynamics import LinearizedObject
@@ -56,6 +56,7 @@ class Certificate:
     worst_factors: tuple[float, float]
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sigma_rad", validated_sigma(self.sigma_rad))
         settle(self, "deformable", _require_deformable)
         settle(self, "conditions", require_params, CertificateConditions)
         settle(self, "intervals", require_params, ParameterIntervals)
@@ -153,7 +154,9 @@ class Certificate:
         Raises:
             ParameterError: not a bound > 0 that is at most the certified one.
         """
-        require_positive("acceleration_bound_m_s2", acceleration_bound_m_s2, "m/s²")
+        acceleration_bound_m_s2 = require_positive(
+            "acceleration_bound_m_s2", acceleration_bound_m_s2, "m/s²"
+        )
         if acceleration_bound_m_s2 > self.acceleration_bound:
             raise ParameterError(
                 "acceleration_bound_m_s2",
@@ -165,7 +168,7 @@ class Certificate:
         return replace(
             self,
             nu_max=self.nu_max - lost,
-            acceleration_bound=float(acceleration_bound_m_s2),
+            acceleration_bound=acceleration_bound_m_s2,
         )
 
     def proven(self) -> Certificate:

@@ -81,7 +81,7 @@ def certify(
     """
     if not isinstance(deformable, LinearizedObject):
         require_instance("beam", deformable, BeamParams)
-    validated_sigma(sigma_rad)
+    sigma_rad = validated_sigma(sigma_rad)
     require_choice("method", method, CERTIFICATE_METHODS, CertificateError)
     conditions = CertificateConditions() if conditions is None else conditions
     intervals = EXACT_PARAMETERS if intervals is None else intervals

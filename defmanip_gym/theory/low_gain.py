@@ -167,7 +167,7 @@ def stabilize(linear: LinearizedObject, sigma_rad: float, mu: float) -> Internal
         ParameterError: σ or μ out of range, or an object that this input cannot stabilize.
         CertificateError: its equilibrium alone uses up σ.
     """
-    validated_sigma(sigma_rad)
+    sigma_rad = validated_sigma(sigma_rad)
     mu = require_positive("mu", mu, "m/s²")
     budget = sigma_rad - float(np.abs(linear.equilibrium).max())
     if not budget > 0:

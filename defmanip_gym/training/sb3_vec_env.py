@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices,
 
 from defmanip_gym.envs.state import get_state, set_state, wrappers
 from defmanip_gym.errors import ParameterError, StartError
+from defmanip_gym.validation import require_instance
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
@@ -53,6 +54,7 @@ class Sb3VecEnv(VecEnv):
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
+        require_instance("env", env, VectorEnv)
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             raise ParameterError(
@@ -80,9 +82,11 @@ class Sb3VecEnv(VecEnv):
         """
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
         options = _batch_options(self._options)
-        observation, info = self.env.reset(seed=seeds, options=options)  # type: ignore[arg-type]
-        self._reset_seeds()
-        self._reset_options()
+        try:
+            observation, info = self.env.reset(seed=seeds, options=options)  # type: ignore[arg-type]
+        finally:  # what was refused is not asked for again
+            self._reset_seeds()
+            self._reset_options()
         self._returns[:] = self._lengths[:] = 0
         self.step_info = info
         self.reset_infos = _rows(info, np.arange(self.num_envs))

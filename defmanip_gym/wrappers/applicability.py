@@ -136,7 +136,10 @@ class Applicability:
             return f"the swing at the start is measured to within {self._start_noise_rad:.3g} rad"
         if certificate.proof == "linear":
             return "the bound is proven for the linearized beam only"
-        errors = realization_errors(config, certificate)
+        try:
+            errors = realization_errors(config, certificate)
+        except CertificateError as error:
+            return f"its errors are not known: {error}"
         if errors.yaw_rate_rad_s > certificate.conditions.yaw_rate_rad_s:
             return f"it may turn at {errors.yaw_rate_rad_s:.3g} rad/s" + self._allowed_yaw_rate
         if not errors.room_m_s2 <= self._budget.room_m_s2:

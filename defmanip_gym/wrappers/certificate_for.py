@@ -13,6 +13,7 @@ from defmanip_gym.theory.certificates import (
     ParameterIntervals,
     certify,
 )
+from defmanip_gym.validation import require_instance, require_params
 from defmanip_gym.wrappers.realization import realization_errors
 
 _ROUNDS = 4
@@ -37,6 +38,8 @@ def certificate_for(
     Raises:
         CertificateError: errors and conditions alone use up σ, or nothing is proven for this beam.
     """
+    require_instance("config", config, TransportConfig)
+    conditions = require_params("conditions", conditions, CertificateConditions)
     beams = config.beam_ranges.extremes(config.beam)
     weakest = min(beams, key=lambda beam: beam.damping)
     ends = [beam.damping / weakest.damping if weakest.damping else 1.0 for beam in beams]

@@ -18,6 +18,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.disturbance import disturbing_force
 from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.survey import clean_observations
+from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamRanges
 from defmanip_gym.plant.simulation import Simulation
@@ -32,6 +33,7 @@ _COUNT, _RESTING = 1024, 128  # motions searched, and those of them that start f
 _PERIODS = 3  # of each; the first shows what the wrapper cannot know beforehand
 _READINGS = 8  # at most, within a period
 _LATEST_START = 5000  # control periods; disturbances depend on the time
+_MOST_WORK = 200  # segments times physics steps in a control period; a few seconds of search
 _MARGIN = 1.1  # on what the search finds
 
 
@@ -57,7 +59,18 @@ def realization_errors(config: TransportConfig, certificate: Certificate) -> Rea
     Args:
         config: the environment's definition, in task mode.
         certificate: for its beam; bounds and conditions are enforced in the search.
+
+    Raises:
+        CertificateError: the search would take too long.
     """
+    work = config.beam.segment_count * config.task.substeps
+    if work > _MOST_WORK:
+        raise CertificateError(
+            "segments times physics steps in a control period",
+            work,
+            f"at most {_MOST_WORK}, to search for errors",
+            "Use longer physics steps, shorter control periods or fewer segments.",
+        )
     each = []
     for beam in dict.fromkeys(config.beam_ranges.extremes(config.beam)):
         carried = replace(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from defmanip_gym.baselines.tanner import TannerController, TannerParams
-from defmanip_gym.errors import CertificateError, GainError
+from defmanip_gym.errors import CertificateError, GainError, ParameterError
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, CertificateConditions, certify
 from defmanip_gym.theory.control_laws import ForceLoopGains
@@ -131,3 +131,10 @@ def test_certificates_without_room_to_lift_or_turn_are_refused():
         TannerController(certificate=narrow)
     with pytest.raises(CertificateError, match="coordinate_count"):
         TannerController(beam=BeamParams(segment_count=2), certificate=L1)
+
+
+@pytest.mark.parametrize("name", ["beam", "robot", "task", "certificate", "params"])
+@pytest.mark.parametrize("wrong", [5, 0, np.zeros(3), "nominal"])
+def test_parameters_of_another_kind_are_refused(name, wrong):
+    with pytest.raises(ParameterError, match=name):
+        TannerController(**{name: wrong})

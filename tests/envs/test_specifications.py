@@ -142,3 +142,30 @@ def test_linearized_object_takes_lists_and_refuses_other_shapes():
             replace(linear, **{name: bad})
     with pytest.raises(ParameterError, match="m_o22"):
         replace(linear, m_o22=np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"width": np.int64(84)},
+        {"sigma_rad": np.float32(0.5)},
+        {"task": {"goal": np.array((0.0, 0.0, 0.0, 1.5, -1.5, 0.0))}},
+        {"default_camera_config": {"lookat": np.array((0.0, 0.0, 1.0))}},
+    ],
+)
+def test_numpys_numbers_go_through_json(arguments):
+    env = gymnasium.make(ENV_ID, **arguments)
+    again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.config == env.unwrapped.config
+
+
+def test_a_batchs_specification_goes_through_json():
+    mode = gymnasium.vector.AutoresetMode.SAME_STEP
+    env = gymnasium.make_vec(ENV_ID, num_envs=np.int64(2), autoreset_mode=mode)
+    assert EnvSpec.from_json(env.spec.to_json()).kwargs["autoreset_mode"] == "SameStep"
+
+
+def test_images_show_an_episode_at_its_own_speed():
+    task = TaskParams(control_period_s=0.1)
+    assert gymnasium.make(ENV_ID, task=task).metadata["render_fps"] == 10
+    assert gymnasium.make_vec(ENV_ID, num_envs=2, task=task).metadata["render_fps"] == 10

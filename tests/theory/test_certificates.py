@@ -1,4 +1,5 @@
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -243,3 +244,10 @@ def test_what_is_proven_for_the_nonlinear_object_is_a_certificate_of_its_own():
         certify(linearize(beam)).proven()
     with pytest.raises(CertificateError, match="nonlinear_limit"):
         certify(beam, method="tanner_printed").proven()
+
+
+@pytest.mark.parametrize("sigma", [Fraction(1, 3), np.array(0.4), np.float32(0.4)])
+@pytest.mark.parametrize("method", ["tanner", "l1", "phase_plane"])
+def test_any_real_number_is_a_sigma(sigma, method):
+    certificate = certify(BeamParams(), sigma_rad=sigma, method=method)
+    assert certificate == certify(BeamParams(), sigma_rad=float(sigma), method=method)

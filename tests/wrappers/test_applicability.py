@@ -165,3 +165,13 @@ def test_ranges_of_damping_are_certified_at_their_ends():
     env = gymnasium.make(ENV_ID, beam_ranges=ranges)
     certificate = certificate_for(env.unwrapped.config)
     assert reason(certificate, beam_ranges=ranges) == ""
+
+
+def test_an_environment_too_dear_to_search_for_errors_gets_no_promise():
+    task = TaskParams(control_period_s=0.01, physics_period_s=1e-5)
+    env = NuMaxActionScaling(gymnasium.make(ENV_ID, task=task), CERTIFICATE)
+    _, info = env.reset(seed=0)
+    assert not info["certificate_applies"]
+    assert "errors are not known" in info["certificate_reason"]
+    with pytest.raises(CertificateError, match="longer physics steps"):
+        certificate_for(env.unwrapped.config)

@@ -49,6 +49,8 @@ def load_agent(name: str | Path, library: Path = SHIPPED) -> MlpActor:
     Raises:
         AgentFileError: nothing there, or not an agent of this package.
     """
+    if not isinstance(name, str | Path):
+        raise AgentFileError("agent", name, "a name or a path", "See defmanip agents.")
     text = name.as_posix() if isinstance(name, Path) else name
     family, _, member = text.partition("/")
     families = shipped_families(library)

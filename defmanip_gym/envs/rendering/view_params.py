@@ -89,7 +89,7 @@ class ViewParams:
             raise ParameterError(
                 "camera_name",
                 self.camera_name,
-                f"None beside camera_id = {self.camera_id!r}",
+                "None beside a camera_id",
                 "Give one of both.",
             )
         if self.default_camera_config is not None:
