@@ -232,7 +232,7 @@ def number_array(values: object) -> NDArray[np.float64] | None:
         if array.dtype == np.float64 and isinstance(values, list | tuple):
             return array  # which is new, and a step is short
         return np.array(array, dtype=np.float64, order="C")
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError, RuntimeError):  # the last one is PyTorch's
         return None
 
 

@@ -136,7 +136,15 @@ def test_numbers_have_an_upper_end_and_steps_a_budget(kind, values, name):
     assert caught.value.name == name
 
 
+class Refusing:
+    """What arrays of other libraries do that are not to be read."""
+
+    def __array__(self, *args, **kwargs):
+        raise RuntimeError("Call detach() first.")
+
+
 ACTIONS = [
+    Refusing(),
     *([10**400, 0, 0], [10**5000, 0, 0], [1e400, 0, 0], [None, 0, 0], [[1], [2, 3], 0], "abc"),
     *(
         ["1", "2", "3"],

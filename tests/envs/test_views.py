@@ -166,6 +166,8 @@ REFUSED = [
     ("elevation", {"default_camera_config": {"elevation": np.nan}}),
     ("lookat", {"default_camera_config": {"lookat": [1.0, 2.0]}}),
     ("trackbodyid", {"default_camera_config": {"trackbodyid": 99}}),
+    ("trackbodyid", {"default_camera_config": {"trackbodyid": 1.5}}),
+    ("trackbodyid", {"default_camera_config": {"trackbodyid": np.zeros(2)}}),
     ("trackbodyid", {"default_camera_config": {"trackbodyid": 1, "lookat": [0, 0, 0]}}),
 ]
 

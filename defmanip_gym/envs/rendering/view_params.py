@@ -52,6 +52,8 @@ class FreeCameraParams:
         ):
             if getattr(self, name) is not None:
                 settle(self, name, require_number, low, high, unit)
+        if self.trackbodyid is not None:
+            settle(self, "trackbodyid", require_whole, 0)
         if self.lookat is not None:
             settle(self, "lookat", require_finite_sequence, 3)
             if self.trackbodyid is not None:
