@@ -57,7 +57,7 @@ def wait_for_a_file(folder, process):
 def said_by_us(errors):
     """Return the lines but those of joblib's tracker.
 
-    It warns where Ctrl-C comes between the end of a semaphore and the word of it: once in ten times.
+    It warns where Ctrl-C comes between the end of a semaphore and the word of it: one time in ten.
     """
     tracker = ("resource_tracker", "warnings.warn(")
     return [line for line in errors.splitlines() if not any(word in line for word in tracker)]
