@@ -15,6 +15,8 @@ from joblib.parallel import get_active_backend
 
 from defmanip_gym.evaluation.jobs import Job, JobResult, run_job
 
+_PATIENCE_S = 5.0
+
 
 @contextmanager
 def running(jobs: Sequence[Job], processes: int | None) -> Iterator[Iterator[JobResult]]:
@@ -26,6 +28,7 @@ def running(jobs: Sequence[Job], processes: int | None) -> Iterator[Iterator[Job
             ``joblib.parallel_config`` decides itself.
     """
     backend, _ = get_active_backend()
+    threads_before = set(threading.enumerate())
     arguments: dict[str, Any] = {}
     if isinstance(backend, LokyBackend):
         # Ctrl-C is for this process, which ends the others; this is for workers that come later
@@ -37,10 +40,20 @@ def running(jobs: Sequence[Job], processes: int | None) -> Iterator[Iterator[Job
         results = parallel(joblib.delayed(run_job)(job) for job in jobs)
     try:
         yield results
-    finally:
-        with warnings.catch_warnings():  # that some jobs were not waited for is the purpose
-            warnings.simplefilter("ignore")
-            results.close()
+    except BaseException:
+        _close(results)
+        # joblib's own, which would be cut off by the exit amid giving back semaphores
+        for thread in set(threading.enumerate()) - threads_before:
+            thread.join(_PATIENCE_S)
+        raise
+    else:
+        _close(results)
+
+
+def _close(results: Any) -> None:
+    with warnings.catch_warnings():  # that some jobs were not waited for is the purpose
+        warnings.simplefilter("ignore")
+        results.close()
 
 
 @contextmanager
