@@ -136,7 +136,7 @@ def generalized_forces_at(
     forces: Array,
     i: int,
 ) -> None:
-    """Write T_r for one state into row i of ``forces``, (n, 4).
+    """Write T_r of Eq. (28) for one state into row i of ``forces``, (n, 4) N and N·m.
 
     Args:
         model: what is believed.
