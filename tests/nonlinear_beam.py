@@ -3,7 +3,7 @@
 import numpy as np
 
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
-from defmanip_gym.theory.object_model import HangingBeam
+from defmanip_gym.theory.payload.object_model import HangingBeam
 
 
 def one_hinge_acceleration(beam: BeamParams):

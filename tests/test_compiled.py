@@ -92,7 +92,7 @@ def run(script, **environment):
 
 LIMIT = """
 import numpy as np
-from defmanip_gym.theory.control_laws import _limit_speeds, limit_speed
+from defmanip_gym.theory.control.control_laws import _limit_speeds, limit_speed
 def limit():
     limited = limit_speed(np.array((8.0, 0.0, 0.0)), np.zeros(3), 1.0, 0.25)
     assert limited.tolist() == [4.0, 0.0, 0.0]

@@ -25,8 +25,8 @@ from defmanip_gym.params import (
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.task_params import RewardParams, StartParams, TaskParams
 from defmanip_gym.theory.certificates import CertificateConditions, ParameterIntervals
-from defmanip_gym.theory.control_laws import ForceLoopGains
-from defmanip_gym.theory.velocity_field import LiteralField, NormalizedField
+from defmanip_gym.theory.control.control_laws import ForceLoopGains
+from defmanip_gym.theory.control.velocity_field import LiteralField, NormalizedField
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.tune_config import TuneConfig
 from defmanip_gym.wrappers.action_delay import ActionDelay

@@ -7,7 +7,7 @@ import numpy as np
 
 from defmanip_gym.attack.target import YAW
 from defmanip_gym.plant.rig_model import CARRIAGE_JOINTS, RigModel
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 _CARRIAGE = len(CARRIAGE_JOINTS)
 _YAW_DOF = CARRIAGE_JOINTS.index("carriage_yaw")

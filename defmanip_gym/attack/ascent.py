@@ -9,7 +9,7 @@ import numpy as np
 from defmanip_gym.attack.adjoint import Adjoint
 from defmanip_gym.attack.plans import Outcome, Plan, Proving
 from defmanip_gym.attack.target import UP, YAW, InputLimits
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 _STEP_LENGTHS = (1.0, 0.5, 0.25)
 _FLIPPED_SHARES = (0.5, 0.75, 0.9)

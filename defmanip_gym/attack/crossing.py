@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 ACCURACY = 5e-3
 # the peaks of soft objects grow a little less than in proportion

@@ -10,7 +10,7 @@ import numpy as np
 from defmanip_gym.attack.switching import FeedbackLaw
 from defmanip_gym.attack.target import InputLimits, Target
 from defmanip_gym.plant.object_rig import ObjectRig, Shaking
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from defmanip_gym.attack.crossing import ACCURACY
 from defmanip_gym.attack.target import InputLimits, PlantFactors
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,8 +15,8 @@ from defmanip_gym.attack.plans import Outcome, Plan, Proving
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.attack.switching import FeedbackLaw, modal_laws, worst_switching
 from defmanip_gym.attack.target import InputLimits, PlantFactors, Target
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.peak_bounds import l1_bound
+from defmanip_gym.theory.certificates.peak_bounds import l1_bound
+from defmanip_gym.theory.dynamics.chain import Array
 
 _DECAYED_TO, _LEAST_SWINGS = 0.01, 1.5
 _STRETCHES = (1.0, 1.01, 1.02, 1.03)

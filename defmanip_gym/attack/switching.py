@@ -9,8 +9,8 @@ from scipy.linalg import eigh, expm
 
 from defmanip_gym.attack.target import UP, YAW
 from defmanip_gym.plant.object_rig import Command
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.zero_dynamics import LinearizedObject
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 
 def worst_switching(

@@ -10,8 +10,8 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.objects.mjcf_object import MjcfObject
 from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.rig_model import RigModel, beam_rig
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.zero_dynamics import LinearizedObject, linearize
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject, linearize
 from defmanip_gym.validation import require_non_negative, settle
 
 FORWARD, LEFT, UP, YAW = range(4)

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.control_laws import (
+from defmanip_gym.theory.control.control_laws import (
     ForceLoopGains,
     force_loop,
     integrate_unless_saturated,
     saturated_tracking,
 )
-from defmanip_gym.theory.frames import base_to_world, world_to_base
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.velocity_field import VelocityField
+from defmanip_gym.theory.control.velocity_field import VelocityField
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.frames import base_to_world, world_to_base
+from defmanip_gym.theory.payload.object_model import HangingBeam
 
 # share of the yaw rate bound that desired velocities use
 _YAW_SHARE = 0.8

@@ -20,12 +20,12 @@ from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import Certificate
-from defmanip_gym.theory.control_laws import ForceLoopGains
-from defmanip_gym.theory.frames import base_to_world
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.theory.stability import SampledLoop
-from defmanip_gym.theory.velocity_field import LiteralField, NormalizedField, VelocityField
+from defmanip_gym.theory.control.control_laws import ForceLoopGains
+from defmanip_gym.theory.control.stability import SampledLoop
+from defmanip_gym.theory.control.velocity_field import LiteralField, NormalizedField, VelocityField
+from defmanip_gym.theory.dynamics.frames import base_to_world
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.payload.object_model import HangingBeam
 from defmanip_gym.validation import (
     require_choice,
     require_flag,

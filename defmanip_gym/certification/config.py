@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Literal
 
 from defmanip_gym.params import BeamParams, validated_sigma
-from defmanip_gym.theory.conditions import CertificateConditions, ParameterIntervals
-from defmanip_gym.theory.elastic_beam import elastic_beam
+from defmanip_gym.theory.certificates.conditions import CertificateConditions, ParameterIntervals
+from defmanip_gym.theory.payload.elastic_beam import elastic_beam
 from defmanip_gym.validation import require_flag, require_number, settle
 
 

@@ -22,9 +22,9 @@ from defmanip_gym.theory.certificates import (
     Certificate,
     certify,
 )
-from defmanip_gym.theory.conditions import CertificateConditions
-from defmanip_gym.theory.peak_bounds import resonant_limit
-from defmanip_gym.theory.zero_dynamics import LinearizedObject
+from defmanip_gym.theory.certificates.conditions import CertificateConditions
+from defmanip_gym.theory.certificates.peak_bounds import resonant_limit
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 
 @dataclass(frozen=True, kw_only=True)

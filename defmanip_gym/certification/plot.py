@@ -14,7 +14,7 @@ from defmanip_gym.certification.ladder import Ladder
 from defmanip_gym.certification.table import PROOFS
 from defmanip_gym.display import save_figure
 from defmanip_gym.plant.object_rig import ObjectRig
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 _COLOURS = {"nonlinear": "#1b7f4d", "linear": "#2f6db3", "none": "#b9b9b9"}
 _INK, _RED = "#333333", "#c0392b"

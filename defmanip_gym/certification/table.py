@@ -12,7 +12,7 @@ from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import Ladder
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, PHASE_PLANE, Certificate
-from defmanip_gym.theory.conditions import EXACT_PARAMETERS
+from defmanip_gym.theory.certificates.conditions import EXACT_PARAMETERS
 from defmanip_gym.version import __version__
 
 _NONE = "–"

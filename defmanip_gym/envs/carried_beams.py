@@ -14,7 +14,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.simulation import Simulation
-from defmanip_gym.theory.object_model import HangingBeam, held_forces
+from defmanip_gym.theory.payload.object_model import HangingBeam, held_forces
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]

@@ -17,7 +17,7 @@ from defmanip_gym.params import (
     validated_sigma,
 )
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_choice, require_params, settle
 
 ControlMode = Literal["task", "force"]

@@ -11,15 +11,15 @@ from defmanip_gym.compiled import compilable, compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ActionError
 from defmanip_gym.plant.plant_state import PlantState
-from defmanip_gym.theory.control_laws import limited_acceleration
-from defmanip_gym.theory.feedback_linearization import (
+from defmanip_gym.theory.control.control_laws import limited_acceleration
+from defmanip_gym.theory.dynamics.feedback_linearization import (
     FeedbackLinearization,
     NominalModel,
     StateRoom,
     generalized_forces_at,
 )
-from defmanip_gym.theory.redundancy import RedundancyResolution
-from defmanip_gym.theory.robot_model import ArmLengths, grasp_velocity
+from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
+from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
 from defmanip_gym.validation import number_array
 
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.task import TaskState
 from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
-from defmanip_gym.theory.frames import turned
-from defmanip_gym.theory.robot_model import ArmLengths, grasp_velocity, reach_and_height
-from defmanip_gym.theory.velocity_field import streamline_heading
+from defmanip_gym.theory.control.velocity_field import streamline_heading
+from defmanip_gym.theory.dynamics.frames import turned
+from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity, reach_and_height
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import Numbers, compilable
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
-from defmanip_gym.theory.robot_model import ArmLengths, reach_and_height
+from defmanip_gym.theory.dynamics.robot_model import ArmLengths, reach_and_height
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from defmanip_gym.evaluation.records import EpisodeRecord, Outcome
 from defmanip_gym.evaluation.suites import Scenario
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.control_laws import limit_speed
-from defmanip_gym.theory.object_model import HangingBeam
+from defmanip_gym.theory.control.control_laws import limit_speed
+from defmanip_gym.theory.payload.object_model import HangingBeam
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.theory.frames import base_to_world
+from defmanip_gym.theory.dynamics.frames import base_to_world
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from defmanip_gym.params import LARGEST_SIGMA_RAD
 from defmanip_gym.plant.object_copy import HELD_SITE
 from defmanip_gym.plant.object_file import ObjectFile, read_object_file
 from defmanip_gym.plant.rig_model import CARRIAGE_JOINTS, RigModel
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.zero_dynamics import LinearizedObject
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 _CARRIAGE = len(CARRIAGE_JOINTS)
 _FORWARD, _LEFT, _UP, _YAW = range(4)

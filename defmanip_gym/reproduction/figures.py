@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from defmanip_gym.reproduction.course import FORCE_ERROR, POSITION, Course
 from defmanip_gym.reproduction.parts import Numbers
 from defmanip_gym.reproduction.setting import SIGMA_RAD
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 Arrays = Mapping[str, Array]
 

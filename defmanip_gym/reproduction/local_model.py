@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 _STEP = 1e-4
 

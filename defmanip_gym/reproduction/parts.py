@@ -15,7 +15,7 @@ import numpy as np
 
 from defmanip_gym.errors import RecordError
 from defmanip_gym.files import write_atomically
-from defmanip_gym.theory.chain import Array
+from defmanip_gym.theory.dynamics.chain import Array
 
 Numbers = dict[str, Any]
 

@@ -9,7 +9,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams, DisturbanceParams
 from defmanip_gym.task_params import StartParams, TaskParams
 from defmanip_gym.theory.certificates import certify
-from defmanip_gym.theory.control_laws import ForceLoopGains
+from defmanip_gym.theory.control.control_laws import ForceLoopGains
 
 SIGMA_RAD = math.pi / 6
 PLANT_DAMPING = 0.1

@@ -21,8 +21,8 @@ from defmanip_gym.reproduction.parts import Numbers, Part
 from defmanip_gym.reproduction.setting import PLANT_DAMPING, SIGMA_RAD, paper_setting
 from defmanip_gym.reproduction.transport import run_transport
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.stability import SampledLoop
+from defmanip_gym.theory.control.stability import SampledLoop
+from defmanip_gym.theory.dynamics.chain import Array
 
 ASSUMED_DAMPINGS = (0.1, 0.0, 1.0)
 

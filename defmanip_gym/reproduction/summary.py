@@ -18,10 +18,10 @@ from defmanip_gym.reproduction.course import (
 )
 from defmanip_gym.reproduction.parts import Numbers
 from defmanip_gym.reproduction.setting import LoopStage, PaperSetting
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH
-from defmanip_gym.theory.stability import SampledLoop, smallest_k2
-from defmanip_gym.theory.velocity_field import potential_gradient
+from defmanip_gym.theory.control.stability import SampledLoop, smallest_k2
+from defmanip_gym.theory.control.velocity_field import potential_gradient
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 
 _PATH_STEP_M = 0.005
 _GOAL_RADIUS_M = 0.05

@@ -26,13 +26,13 @@ from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.reproduction.course import POSITION, VELOCITY, Course, CourseRecorder
 from defmanip_gym.reproduction.local_model import LocalModel, local_model
 from defmanip_gym.reproduction.setting import LoopStage, PaperSetting
-from defmanip_gym.theory.chain import Array
-from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
-from defmanip_gym.theory.frames import base_to_world
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.redundancy import RedundancyResolution
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.theory.velocity_field import NormalizedField
+from defmanip_gym.theory.control.velocity_field import NormalizedField
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.feedback_linearization import FeedbackLinearization
+from defmanip_gym.theory.dynamics.frames import base_to_world
+from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.payload.object_model import HangingBeam
 
 
 class PaperLoop:

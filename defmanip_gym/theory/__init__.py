@@ -6,18 +6,20 @@ them by the heading θ gives the paper's world coordinates.
 
 Reading order, beside the paper (docs/paper_map.md has every equation):
 
-=========  =====================================================================================
-II.A       ``chain``, ``robot_model`` (1), (2), (7); ``task_space`` (3), (4), (8), (28)
-II.B       ``object_model`` (5), (6), (10), (11); ``elastic_beam``
-III        ``passivity`` Lemma III.1; ``zero_dynamics`` (12)–(16); ``controllability``;
-           ``low_gain`` (24)–(26); ``iss_gain`` (17), (21); ``acceleration_budget`` (19), (31)
-III, on    ``certificates``, ``certificate``, ``conditions``: the ladder of bounds, built of
-           ``peak_bounds`` (18), ``impulse_response``, ``small_gain``, ``worst_case``, ``limits``,
-           ``phase_plane``, ``nonlinear_margin``; ``error_budget``, what sampling costs of it
-IV         ``control_laws`` (20), (27), (29); ``certified_command`` Remark IV.1;
-           ``velocity_field`` IV.A; ``redundancy``, ``pseudoinverse_resolution`` IV.B;
-           ``feedback_linearization`` (28)
-V          ``continuous_loop`` (30)–(34); ``stability``, ``effective_damping``: what sampling and
-           wrong parameters make of it
-=========  =====================================================================================
+=================  ================================================================================
+II.A, IV.B         ``dynamics``: ``chain``, ``robot_model`` (1), (2), (7); ``frames``;
+                   ``task_space`` (3), (4), (8), (28); ``redundancy``,
+                   ``pseudoinverse_resolution`` IV.B; ``feedback_linearization`` (28)
+II.B, III          ``payload``: ``object_model`` (5), (6), (10), (11); ``elastic_beam``;
+                   ``passivity`` Lemma III.1; ``zero_dynamics`` (12)–(16); ``controllability``
+III                ``certificates``: ``low_gain`` (24)–(26); ``iss_gain`` (17), (21);
+                   ``acceleration_budget`` (19), (31); ``ladder``, ``certificate``,
+                   ``conditions``: the ladder of bounds, built of ``peak_bounds`` (18),
+                   ``impulse_response``, ``small_gain``, ``worst_case``, ``limits``,
+                   ``phase_plane``, ``nonlinear_margin``; ``certified_command`` Remark IV.1;
+                   ``error_budget``, what sampling costs of it
+IV.A, V            ``control``: ``velocity_field`` IV.A; ``control_laws`` (20), (27), (29);
+                   ``continuous_loop`` (30)–(34); ``stability``, ``effective_damping``: what
+                   sampling and wrong parameters make of it
+=================  ================================================================================
 """

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.certificate import Certificate
-from defmanip_gym.theory.impulse_response import peak_free_response, peak_gains
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, PITCH_TO_JOINT, ArmKinematics
-from defmanip_gym.theory.zero_dynamics import LinearizedObject, linearize
+from defmanip_gym.theory.certificates.certificate import Certificate
+from defmanip_gym.theory.certificates.impulse_response import peak_free_response, peak_gains
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, PITCH_TO_JOINT, ArmKinematics
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject, linearize
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

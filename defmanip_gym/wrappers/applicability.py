@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.certificate import Certificate
-from defmanip_gym.theory.error_budget import ErrorBudget
+from defmanip_gym.theory.certificates.certificate import Certificate
+from defmanip_gym.theory.certificates.error_budget import ErrorBudget
 from defmanip_gym.wrappers.admissible_motions import arm_range
 from defmanip_gym.wrappers.certified_motion import GraspMotion
 from defmanip_gym.wrappers.realization import realization_errors

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.theory.certificate import Certificate
-from defmanip_gym.theory.certified_command import certified_command
-from defmanip_gym.theory.frames import base_to_world
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.certificates.certificate import Certificate
+from defmanip_gym.theory.certificates.certified_command import certified_command
+from defmanip_gym.theory.dynamics.frames import base_to_world
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

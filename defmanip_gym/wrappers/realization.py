@@ -22,8 +22,8 @@ from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamRanges
 from defmanip_gym.plant.simulation import Simulation
-from defmanip_gym.theory.certificate import Certificate
-from defmanip_gym.theory.error_budget import ErrorBudget
+from defmanip_gym.theory.certificates.certificate import Certificate
+from defmanip_gym.theory.certificates.error_budget import ErrorBudget
 from defmanip_gym.wrappers.admissible_motions import Motions, moving_motions, resting_motions
 from defmanip_gym.wrappers.certified_motion import CertifiedMotion, GraspMotion
 

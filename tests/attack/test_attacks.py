@@ -24,9 +24,9 @@ from defmanip_gym.theory.certificates import (
     ParameterIntervals,
     certify,
 )
-from defmanip_gym.theory.elastic_beam import elastic_beam
-from defmanip_gym.theory.peak_bounds import l1_bound
-from defmanip_gym.theory.zero_dynamics import linearize
+from defmanip_gym.theory.certificates.peak_bounds import l1_bound
+from defmanip_gym.theory.payload.elastic_beam import elastic_beam
+from defmanip_gym.theory.payload.zero_dynamics import linearize
 
 SIGMA = math.pi / 6
 

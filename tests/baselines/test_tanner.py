@@ -10,7 +10,7 @@ from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.errors import CertificateError, GainError, ParameterError
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, CertificateConditions, certify
-from defmanip_gym.theory.control_laws import ForceLoopGains
+from defmanip_gym.theory.control.control_laws import ForceLoopGains
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"

@@ -4,8 +4,8 @@ import pytest
 
 from defmanip_gym.params import BeamParams, LinkParams, RobotParams
 from defmanip_gym.plant.builder import build_model
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.robot_model import robot_chain
+from defmanip_gym.theory.dynamics.robot_model import robot_chain
+from defmanip_gym.theory.payload.object_model import HangingBeam
 
 ROBOT = RobotParams(
     base_mass_kg=37.0,

@@ -7,7 +7,7 @@ from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
-from defmanip_gym.theory.frames import base_to_world
+from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.wrappers.applicability import Applicability
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 

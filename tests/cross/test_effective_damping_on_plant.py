@@ -7,13 +7,13 @@ import pytest
 from hanging_rig import HangingRig
 
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.effective_damping import (
+from defmanip_gym.theory.control.effective_damping import (
     force_tracking_gain,
     largest_assumed_damping_factor,
     under_force_tracking,
 )
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.zero_dynamics import linearize
+from defmanip_gym.theory.payload.object_model import HangingBeam
+from defmanip_gym.theory.payload.zero_dynamics import linearize
 
 PERIOD_S = 2e-3
 BRAKE = 1e-3  # 1/s, so slow that it does not take part in the swing

@@ -5,11 +5,11 @@ import pytest
 
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.params import BeamParams, RobotParams
-from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
-from defmanip_gym.theory.frames import world_to_base
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.redundancy import RedundancyResolution
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.dynamics.feedback_linearization import FeedbackLinearization
+from defmanip_gym.theory.dynamics.frames import world_to_base
+from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
+from defmanip_gym.theory.payload.object_model import HangingBeam
 
 PERIOD_S = 2e-4
 

@@ -5,11 +5,11 @@ import pytest
 from hanging_rig import HangingRig
 
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
-from defmanip_gym.theory.continuous_loop import closed_loop_matrix
-from defmanip_gym.theory.control_laws import ForceLoopGains, force_loop
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.stability import force_loop_is_stable, smallest_k2
-from defmanip_gym.theory.zero_dynamics import is_hurwitz
+from defmanip_gym.theory.control.continuous_loop import closed_loop_matrix
+from defmanip_gym.theory.control.control_laws import ForceLoopGains, force_loop
+from defmanip_gym.theory.control.stability import force_loop_is_stable, smallest_k2
+from defmanip_gym.theory.payload.object_model import HangingBeam
+from defmanip_gym.theory.payload.zero_dynamics import is_hurwitz
 
 PERIOD_S, SUBSTEPS = 0.02, 10
 GRASP_MASS_KG = 10.0

@@ -5,7 +5,7 @@ import pytest
 
 from defmanip_gym.params import BeamParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.theory.frames import base_to_world, world_to_base
+from defmanip_gym.theory.dynamics.frames import base_to_world, world_to_base
 
 BEAM = BeamParams(damping=0.1)
 TASK = TaskParams()

@@ -9,9 +9,9 @@ from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.errors import GainError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.theory.control_laws import ForceLoopGains
-from defmanip_gym.theory.robot_model import JOINT_TO_PITCH
-from defmanip_gym.theory.stability import SampledLoop
+from defmanip_gym.theory.control.control_laws import ForceLoopGains
+from defmanip_gym.theory.control.stability import SampledLoop
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 
 GOAL = TaskParams().goal
 GAINS = ForceLoopGains(k1=0.5, k2=2.0)

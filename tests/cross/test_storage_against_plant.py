@@ -5,8 +5,8 @@ import pytest
 from hanging_rig import HangingRig
 
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.object_model import HangingBeam
-from defmanip_gym.theory.passivity import dissipation, storage
+from defmanip_gym.theory.payload.object_model import HangingBeam
+from defmanip_gym.theory.payload.passivity import dissipation, storage
 
 
 @pytest.mark.parametrize("count", [1, 3])

@@ -10,7 +10,7 @@ from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams
 from defmanip_gym.theory.certificates import certify
-from defmanip_gym.theory.conditions import TRANSPORT_CONDITIONS, ParameterIntervals
+from defmanip_gym.theory.certificates.conditions import TRANSPORT_CONDITIONS, ParameterIntervals
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"

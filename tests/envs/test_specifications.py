@@ -20,7 +20,7 @@ from defmanip_gym.params import (
 )
 from defmanip_gym.task_params import RewardParams, StartParams, TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, ParameterIntervals, certify
-from defmanip_gym.theory.zero_dynamics import linearize
+from defmanip_gym.theory.payload.zero_dynamics import linearize
 from defmanip_gym.validation import plain
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling
 

@@ -11,7 +11,7 @@ from defmanip_gym.objects.mjcf_object import mjcf_object, object_from_mjcf
 from defmanip_gym.params import BeamParams
 from defmanip_gym.plant.object_rig import ObjectRig
 from defmanip_gym.theory.certificates import CertificateConditions, certify
-from defmanip_gym.theory.zero_dynamics import is_hurwitz, linearize
+from defmanip_gym.theory.payload.zero_dynamics import is_hurwitz, linearize
 
 HOSE = files("defmanip_gym.objects") / "examples" / "hose.xml"
 RODS = '<inertial pos="0 0 -0.2" mass="1" diaginertia="0.02 0.02 0.001"/>'

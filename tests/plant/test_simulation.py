@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from defmanip_gym.params import BeamParams, RobotParams
-from defmanip_gym.theory.feedback_linearization import FeedbackLinearization
-from defmanip_gym.theory.redundancy import RedundancyResolution
+from defmanip_gym.theory.dynamics.feedback_linearization import FeedbackLinearization
+from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
 
 SIGMA = math.pi / 6
 WEIGHT_N = BeamParams().mass_kg * 9.81

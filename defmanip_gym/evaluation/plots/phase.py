@@ -13,7 +13,7 @@ from defmanip_gym.evaluation.plots.swing import sigma_rad
 from defmanip_gym.evaluation.traces import Trace
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import Certificate
-from defmanip_gym.theory.phase_plane import one_hinge_reachable_set
+from defmanip_gym.theory.certificates.phase_plane import one_hinge_reachable_set
 
 Edge = tuple[NDArray[np.float64], NDArray[np.float64]]
 

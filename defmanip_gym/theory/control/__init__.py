@@ -1,0 +1,1 @@
+"""Field, tracking and force loop of Sections IV and V, and what sampling makes of them."""
