@@ -1,0 +1,120 @@
+"""What a safety filter takes for granted: about robot and sensors, and about the object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+from defmanip_gym.errors import ParameterError
+from defmanip_gym.params import BeamParams
+from defmanip_gym.validation import require_number, require_range, require_whole, settle
+
+_LARGEST_ERROR = 1000.0
+_LONGEST_DELAY = 50
+_SMALLEST_FACTOR, _LARGEST_FACTOR = 0.01, 100.0
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterConditions:
+    """Errors, noise and delay that a filter makes room for.
+
+    The errors are those of a period's mean acceleration about what the filter foresees: the
+    command, what sampling makes of it, and what came on top of that in the period before.
+
+    Attributes:
+        forward_error_m_s2: forward.
+        lateral_error_m_s2: to the side.
+        vertical_error_m_s2: upwards.
+        storage_error: of the storage after a period with just that acceleration, as a share of V_σ.
+        swing_noise_rad: standard deviation of the measured swing angles.
+        delay_periods: control periods until a command takes effect.
+    """
+
+    forward_error_m_s2: float = 0.1
+    lateral_error_m_s2: float = 0.1
+    vertical_error_m_s2: float = 0.12
+    storage_error: float = 0.001
+    swing_noise_rad: float = 0.0
+    delay_periods: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("forward_error_m_s2", "lateral_error_m_s2", "vertical_error_m_s2"):
+            settle(self, name, require_number, 0.0, _LARGEST_ERROR, "m/s²")
+        settle(self, "storage_error", require_number, 0.0, 1.0)
+        settle(self, "swing_noise_rad", require_number, 0.0, 1.0, "rad")
+        settle(self, "delay_periods", require_whole, 0, _LONGEST_DELAY)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PayloadIntervals:
+    """Constant but unknown factors (lowest, highest) on the parameters of the believed beam.
+
+    Any damping is covered, none included: V never counts on it.
+
+    Attributes:
+        mass: on its mass.
+        length: on its length.
+        stiffness: on the stiffness at its root and in its joints.
+    """
+
+    mass: tuple[float, float] = (1.0, 1.0)
+    length: tuple[float, float] = (1.0, 1.0)
+    stiffness: tuple[float, float] = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            settle(self, name, require_range, _SMALLEST_FACTOR, _LARGEST_FACTOR)
+            low, high = getattr(self, name)
+            if not low <= 1.0 <= high:
+                raise ParameterError(
+                    name, (low, high), "an interval around 1", "Factors are on the believed beam."
+                )
+
+    def corners(self, beam: BeamParams) -> tuple[BeamParams, ...]:
+        """Return the beams that limit the storage, the believed one first.
+
+        V over mass and length is that of a beam of mass 1 with stiffness over mass times length, so
+        without springs mass does not matter. V less V_σ is convex in what is left.
+        """
+        masses, lengths, stiffnesses = (
+            {*ends} for ends in (self.mass, self.length, self.stiffness)
+        )
+        sprung = beam.root_stiffness > 0 or (beam.segment_count > 1 and beam.joint_stiffness > 0)
+        if not sprung:
+            masses = stiffnesses = {1.0}
+        made = (
+            replace(
+                beam,
+                mass_kg=mass * beam.mass_kg,
+                length_m=length * beam.length_m,
+                root_stiffness=root * beam.root_stiffness,
+                joint_stiffness=joint * beam.joint_stiffness,
+            )
+            for mass, length, root, joint in product(
+                sorted(masses), sorted(lengths), sorted(stiffnesses), sorted(stiffnesses)
+            )
+        )
+        return tuple(dict.fromkeys((beam, *made)))
+
+    def cover(self, believed: BeamParams, carried: BeamParams) -> bool:
+        """Whether a beam is the believed one within the intervals."""
+        same = replace(
+            carried,
+            mass_kg=believed.mass_kg,
+            length_m=believed.length_m,
+            damping=believed.damping,
+            joint_damping=believed.joint_damping,
+            root_stiffness=believed.root_stiffness,
+            joint_stiffness=believed.joint_stiffness,
+            radius_m=believed.radius_m,
+        )
+        return same == believed and all(
+            low * own - _ROUNDING <= true <= high * own + _ROUNDING
+            for (low, high), own, true in (
+                (self.mass, believed.mass_kg, carried.mass_kg),
+                (self.length, believed.length_m, carried.length_m),
+                (self.stiffness, believed.root_stiffness, carried.root_stiffness),
+                (self.stiffness, believed.joint_stiffness, carried.joint_stiffness),
+            )
+        )
