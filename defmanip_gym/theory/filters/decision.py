@@ -7,166 +7,30 @@ that is allowed always exists; errors ask for a little more, damping.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from defmanip_gym.compiled import compilable, compiled
-from defmanip_gym.params import GRAVITY_M_S2
+from defmanip_gym.compiled import compilable
 from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.chain import Array
-from defmanip_gym.theory.dynamics.robot_model import reach_and_height, reach_and_height_slopes
+from defmanip_gym.theory.dynamics.robot_model import reach_and_height
+from defmanip_gym.theory.filters.barrier import (
+    DecisionRoom,
+    StorageLevels,
+    coasting,
+    excess_after,
+)
 from defmanip_gym.theory.filters.limits import (
-    RobotLimits,
     braking,
     farthest_share,
     forward_range,
     upward_range,
 )
-from defmanip_gym.theory.filters.period_mean import mean_acceleration
 from defmanip_gym.theory.filters.sensed import Sensed
-from defmanip_gym.theory.filters.storage import (
-    StorageModel,
-    StorageRoom,
-    power_of,
-    storage_at,
-    swing_step,
-)
 
 _NEWTON_STEPS = 4
 _HALVINGS = 14
 _DAMPINGS = 5  # sizes of the damping command that are tried
 _ROUNDING = 1e-9  # of an allowed excess over a level, as a share of it
-
-
-class StorageLevels(NamedTuple):
-    """What the decision depends on.
-
-    Attributes:
-        model: of the beams that may be carried.
-        levels: up to which B may rise, (C,) J.
-        errors: of the period's mean acceleration about what is foreseen, (3,) m/s².
-        residual: of B itself after a period, as a share of V_σ.
-        limits: of the robot.
-    """
-
-    model: StorageModel
-    levels: Array
-    errors: Array
-    residual: float
-    limits: RobotLimits
-
-
-class DecisionRoom(NamedTuple):
-    """Room for one state, and what was found out about the last command that was judged."""
-
-    storage: StorageRoom
-    gradient: Array  # (3,): −∂B/∂w of the beam that allows least, J per m/s²
-    swing: Array  # (N,)
-    swing_rate: Array  # (N,)
-
-    @classmethod
-    def empty(cls, segments: int) -> DecisionRoom:
-        """Return room for N segments."""
-        return cls(StorageRoom.empty(segments), np.empty(3), np.empty(segments), np.empty(segments))
-
-
-@compilable
-def excess_after(
-    setup: StorageLevels,
-    command: tuple[float, float, float],
-    sensed: Sensed,
-    i: int,
-    residual: Array,
-    uncertainty: Array,
-    room: DecisionRoom,
-) -> float:
-    """Return the largest (B after a period − level) / V_σ over the beams, errors included.
-
-    Args:
-        setup: levels, errors and robot.
-        command: that takes effect as it is, m/s².
-        sensed: the states.
-        i: which of them.
-        residual: accelerations beside those foreseen, of the last period, (n, 3) m/s².
-        uncertainty: of the swing, (n, N) rad.
-        room: ``gradient`` is written.
-    """
-    limits, model = setup.limits, setup.model
-    period_s = limits.period_s
-    forward, left, upward, turning = mean_acceleration(
-        limits.arm,
-        limits.rule,
-        command[0],
-        command[1],
-        command[2],
-        sensed.pitch[i, 0],
-        sensed.pitch[i, 1],
-        sensed.pitch_rate[i, 0],
-        sensed.pitch_rate[i, 1],
-        sensed.base_velocity[i, 0],
-        sensed.base_velocity[i, 1],
-        period_s,
-    )
-    reach, _ = reach_and_height(limits.arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
-    forward, upward = forward + residual[i, 0], upward + residual[i, 2]
-    yaw_rate = sensed.base_velocity[i, 1]
-    later_yaw_rate = yaw_rate + period_s * (turning + residual[i, 1] / reach)
-    middle_yaw_rate = 0.5 * (yaw_rate + later_yaw_rate)
-    for j in range(len(room.swing)):
-        room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
-    largest = -np.inf
-    for c in range(len(setup.levels)):
-        swing_step(
-            model,
-            c,
-            room.swing,
-            room.swing_rate,
-            forward,
-            upward,
-            middle_yaw_rate,
-            period_s,
-            room.storage,
-        )
-        s_forward, s_upward, inertia = power_of(model, c, room.storage)
-        leftward = -middle_yaw_rate * inertia / reach
-        after = storage_at(
-            model, c, room.storage.swing, room.storage.swing_rate, later_yaw_rate, room.storage
-        )
-        after += period_s * (
-            abs(s_forward) * setup.errors[0]
-            + abs(leftward) * setup.errors[1]
-            + abs(s_upward) * setup.errors[2]
-        )
-        for j in range(len(room.swing)):
-            slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.storage.sine[j])
-            for k in range(len(room.swing)):
-                slope += abs(model.stiffness[c, j, k] * room.storage.swing[k])
-                curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
-                after += 0.5 * curvature * uncertainty[i, j]
-            curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
-            after += (slope + 0.5 * curvature) * uncertainty[i, j]
-        excess = (after - setup.levels[c]) / model.passes[c] + setup.residual
-        if excess > largest:
-            largest = excess
-            scale = period_s / model.passes[c]
-            room.gradient[0] = scale * s_forward
-            room.gradient[1] = scale * leftward
-            room.gradient[2] = scale * s_upward
-    return largest
-
-
-@compilable
-def coasting(setup: StorageLevels, sensed: Sensed, i: int) -> tuple[float, float, float]:
-    """Return the command under which B does not rise: none, or what keeps |u2| from rising.
-
-    A base that is pushed backwards turns away by itself; holding its yaw rate slows the grasp.
-    """
-    arm = setup.limits.arm
-    rho_1, rho_2, _, _ = reach_and_height_slopes(arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
-    reach_rate = rho_1 * sensed.pitch_rate[i, 0] + rho_2 * sensed.pitch_rate[i, 1]
-    pushed = min(sensed.base_velocity[i, 0] + 2.0 * reach_rate, 0.0)
-    return 0.0, sensed.base_velocity[i, 1] * pushed, 0.0
 
 
 @compilable
@@ -379,69 +243,3 @@ def _on_the_way(
         else:
             near = middle
     return found, excess
-
-
-@compiled
-def decide_all(
-    setup: StorageLevels,
-    wished: Array,
-    sensed: Sensed,
-    residual: Array,
-    uncertainty: Array,
-    room: DecisionRoom,
-    allowed: Array,
-    margins: Array,
-) -> None:
-    """Write the allowed commands (n, 3) m/s² and margins (n,) of n states; see ``decide``."""
-    for i in range(len(wished)):
-        margins[i] = decide(setup, wished, sensed, i, residual, uncertainty, room, allowed)
-
-
-@compiled
-def foresee_all(setup: StorageLevels, commands: Array, sensed: Sensed, foreseen: Array) -> None:
-    """Write the mean accelerations (n, 3) m/s² that commands (n, 3) of a period should make."""
-    limits = setup.limits
-    for i in range(len(commands)):
-        forward, left, up = limited_acceleration(
-            commands[i, 0],
-            commands[i, 1],
-            commands[i, 2],
-            sensed.velocity_b[i, 0],
-            sensed.velocity_b[i, 1],
-            sensed.velocity_b[i, 2],
-            limits.max_speed_m_s,
-            limits.period_s,
-        )
-        foreseen[i, 0], foreseen[i, 1], foreseen[i, 2], _ = mean_acceleration(
-            limits.arm,
-            limits.rule,
-            forward,
-            left,
-            up,
-            sensed.pitch[i, 0],
-            sensed.pitch[i, 1],
-            sensed.pitch_rate[i, 0],
-            sensed.pitch_rate[i, 1],
-            sensed.base_velocity[i, 0],
-            sensed.base_velocity[i, 1],
-            limits.period_s,
-        )
-
-
-@compiled
-def store_all(setup: StorageLevels, sensed: Sensed, room: DecisionRoom, shares: Array) -> None:
-    """Write B over its level, of the beam where it is largest, (n,), for n states."""
-    for i in range(len(shares)):
-        for j in range(len(room.swing)):
-            room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
-        shares[i] = 0.0
-        for c in range(len(setup.levels)):
-            stored = storage_at(
-                setup.model,
-                c,
-                room.swing,
-                room.swing_rate,
-                sensed.base_velocity[i, 1],
-                room.storage,
-            )
-            shares[i] = max(shares[i], stored / setup.levels[c])

@@ -4,36 +4,19 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from defmanip_gym.compiled import compilable, compiled
+from defmanip_gym.compiled import compilable
 from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.redundancy import shared_acceleration
 from defmanip_gym.theory.dynamics.robot_model import reach_and_height
-from defmanip_gym.theory.filters.decision import DecisionRoom, StorageLevels
+from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import swing_step
 
 
-@compiled
-def advance_all(
-    setup: StorageLevels, commands: Array, residual: Array, sensed: Sensed, room: DecisionRoom
-) -> None:
-    """Move n states on by a period of their commands, in place; heading counts from here.
-
-    Args:
-        setup: robot and beams, of which the first is believed.
-        commands: (n, 3) m/s².
-        residual: accelerations beside those foreseen, (n, 3) m/s².
-        sensed: the states.
-        room: for intermediate results.
-    """
-    for i in range(len(commands)):
-        _advance(setup, commands, residual, sensed, i, room)
-
-
 @compilable
-def _advance(
+def advance(
     setup: StorageLevels,
     commands: Array,
     residual: Array,
@@ -41,6 +24,16 @@ def _advance(
     i: int,
     room: DecisionRoom,
 ) -> None:
+    """Move state i on by a period of its command, in place.
+
+    Args:
+        setup: robot and beams, of which the first is believed.
+        commands: (n, 3) m/s².
+        residual: accelerations beside those foreseen, (n, 3) m/s².
+        sensed: the states.
+        i: which of them.
+        room: for intermediate results.
+    """
     limits = setup.limits
     period_s, half = limits.period_s, 0.5 * limits.period_s
     velocity, base, rate = sensed.velocity_b, sensed.base_velocity, sensed.pitch_rate

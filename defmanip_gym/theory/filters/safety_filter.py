@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from abc import ABC, abstractmethod
 from typing import Any, Literal, NamedTuple
 
@@ -9,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.errors import ActionError
-from defmanip_gym.params import BeamParams
+from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.validation import number_array
 
@@ -41,12 +43,26 @@ class SafetyFilter(ABC):
     * ``proof``: for which model of the object its promise is proven.
     * ``sigma_rad``: σ that it keeps.
     * ``segment_count``: N of its object.
+    * ``robot`` and ``task``: what carries it, under which limits.
     """
 
     name: str
     proof: FilterProof
     sigma_rad: float
     segment_count: int
+    robot: RobotParams
+    task: TaskParams
+
+    @property
+    @abstractmethod
+    def specification(self) -> dict[str, Any]:
+        """What the filter was made with, as JSON values: its name and constructor arguments."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SafetyFilter) and self.specification == other.specification
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.specification, sort_keys=True))
 
     @abstractmethod
     def covers(self, beam: BeamParams) -> bool:

@@ -20,15 +20,15 @@ from defmanip_gym.theory.dynamics.robot_model import (
     ArmKinematics,
     ArmLengths,
 )
-from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
-from defmanip_gym.theory.filters.decision import (
-    DecisionRoom,
-    StorageLevels,
+from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
+from defmanip_gym.theory.filters.batches import (
+    advance_all,
     decide_all,
     foresee_all,
+    misjudge_all,
     store_all,
 )
-from defmanip_gym.theory.filters.foresight import advance_all
+from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
 from defmanip_gym.theory.filters.limits import RobotLimits
 from defmanip_gym.theory.filters.safety_filter import (
     BoolArray,
@@ -41,7 +41,7 @@ from defmanip_gym.theory.filters.sensed import Sensed, gained_acceleration
 from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.filters.swing_estimate import SwingEstimate
 from defmanip_gym.theory.payload.object_model import HangingBeam
-from defmanip_gym.validation import require_params
+from defmanip_gym.validation import plain, require_params
 
 _LEAST_BEND_RAD = 0.6
 _LEAST_HEIGHT_SHARE = 1.5  # of the lowest grasp that ends no episode
@@ -144,10 +144,19 @@ class StorageFilter(SafetyFilter):
         )
         self._foresee = machine_code(foresee_all, self.setup, vectors, sensed, vectors)
         self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
+        self._misjudge = machine_code(
+            misjudge_all, self.setup, sensed, sensed, vectors, self._room, numbers
+        )
         if self.conditions.delay_periods:
             self._advance = machine_code(
                 advance_all, self.setup, vectors, vectors, sensed, self._room
             )
+
+    @property
+    def specification(self) -> dict[str, Any]:
+        """What the filter was made with, as JSON values."""
+        names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
+        return {"name": self.name} | {name: plain(getattr(self, name)) for name in names}
 
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
@@ -231,6 +240,17 @@ class StorageFilter(SafetyFilter):
             sensed = sensed._replace(swing=sensed.swing + np.copysign(uncertainty, sensed.swing))
         shares = np.empty(len(sensed.swing))
         self._store(self.setup, sensed, self._room, shares)
+        return shares
+
+    def storage_errors(self, before: Array, after: Array) -> Array:
+        """Return how much more B a period brought than its mean acceleration explains, (n,).
+
+        As shares of V_σ, from observations (n, size) without noise before and after it.
+        """
+        then, now = (Sensed.observed(self._layout, each) for each in (before, after))
+        gained = gained_acceleration(then, now, self.task.control_period_s)
+        shares = np.empty(len(gained))
+        self._misjudge(self.setup, then, now, gained, self._room, shares)
         return shares
 
     def _estimated(self, observation: Array, memory: StorageMemory) -> tuple[Sensed, Array]:

@@ -1,0 +1,138 @@
+"""The filters' loops over episodes: what Python calls (``compiled``)."""
+
+from __future__ import annotations
+
+from defmanip_gym.compiled import compiled
+from defmanip_gym.theory.control.control_laws import limited_acceleration
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
+from defmanip_gym.theory.filters.decision import decide
+from defmanip_gym.theory.filters.foresight import advance
+from defmanip_gym.theory.filters.period_mean import mean_acceleration
+from defmanip_gym.theory.filters.sensed import Sensed
+from defmanip_gym.theory.filters.storage import storage_at, swing_step
+
+
+@compiled
+def decide_all(
+    setup: StorageLevels,
+    wished: Array,
+    sensed: Sensed,
+    residual: Array,
+    uncertainty: Array,
+    room: DecisionRoom,
+    allowed: Array,
+    margins: Array,
+) -> None:
+    """Write the allowed commands (n, 3) m/s² and margins (n,) of n states; see ``decide``."""
+    for i in range(len(wished)):
+        margins[i] = decide(setup, wished, sensed, i, residual, uncertainty, room, allowed)
+
+
+@compiled
+def foresee_all(setup: StorageLevels, commands: Array, sensed: Sensed, foreseen: Array) -> None:
+    """Write the mean accelerations (n, 3) m/s² that commands (n, 3) of a period should make."""
+    limits = setup.limits
+    for i in range(len(commands)):
+        forward, left, up = limited_acceleration(
+            commands[i, 0],
+            commands[i, 1],
+            commands[i, 2],
+            sensed.velocity_b[i, 0],
+            sensed.velocity_b[i, 1],
+            sensed.velocity_b[i, 2],
+            limits.max_speed_m_s,
+            limits.period_s,
+        )
+        foreseen[i, 0], foreseen[i, 1], foreseen[i, 2], _ = mean_acceleration(
+            limits.arm,
+            limits.rule,
+            forward,
+            left,
+            up,
+            sensed.pitch[i, 0],
+            sensed.pitch[i, 1],
+            sensed.pitch_rate[i, 0],
+            sensed.pitch_rate[i, 1],
+            sensed.base_velocity[i, 0],
+            sensed.base_velocity[i, 1],
+            limits.period_s,
+        )
+
+
+@compiled
+def store_all(setup: StorageLevels, sensed: Sensed, room: DecisionRoom, shares: Array) -> None:
+    """Write B over its level, of the beam where it is largest, (n,), for n states."""
+    for i in range(len(shares)):
+        for j in range(len(room.swing)):
+            room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
+        shares[i] = 0.0
+        for c in range(len(setup.levels)):
+            stored = storage_at(
+                setup.model,
+                c,
+                room.swing,
+                room.swing_rate,
+                sensed.base_velocity[i, 1],
+                room.storage,
+            )
+            shares[i] = max(shares[i], stored / setup.levels[c])
+
+
+@compiled
+def advance_all(
+    setup: StorageLevels, commands: Array, residual: Array, sensed: Sensed, room: DecisionRoom
+) -> None:
+    """Move n states on by a period of their commands, in place; see ``advance``."""
+    for i in range(len(commands)):
+        advance(setup, commands, residual, sensed, i, room)
+
+
+@compiled
+def misjudge_all(
+    setup: StorageLevels,
+    before: Sensed,
+    after: Sensed,
+    gained: Array,
+    room: DecisionRoom,
+    shares: Array,
+) -> None:
+    """Write how far B after a period exceeds what its mean acceleration makes foresee, over V_σ.
+
+    Args:
+        setup: of which the first beam is carried.
+        before: n states.
+        after: those a period later.
+        gained: the period's mean acceleration, (n, 3) m/s².
+        room: for intermediate results.
+        shares: the result, (n,).
+    """
+    for i in range(len(shares)):
+        yaw_rate, later_yaw_rate = before.base_velocity[i, 1], after.base_velocity[i, 1]
+        for j in range(len(room.swing)):
+            room.swing[j], room.swing_rate[j] = before.swing[i, j], before.swing_rate[i, j]
+        swing_step(
+            setup.model,
+            0,
+            room.swing,
+            room.swing_rate,
+            gained[i, 0],
+            gained[i, 2],
+            0.5 * (yaw_rate + later_yaw_rate),
+            setup.limits.period_s,
+            room.storage,
+        )
+        foreseen = storage_at(
+            setup.model,
+            0,
+            room.storage.swing,
+            room.storage.swing_rate,
+            later_yaw_rate,
+            room.storage,
+        )
+        for j in range(len(room.swing)):
+            room.swing[j], room.swing_rate[j] = after.swing[i, j], after.swing_rate[i, j]
+        stored = storage_at(
+            setup.model, 0, room.swing, room.swing_rate, later_yaw_rate, room.storage
+        )
+        shares[i] = (stored - foreseen) / setup.model.passes[0]
