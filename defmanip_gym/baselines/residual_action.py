@@ -21,8 +21,9 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 from defmanip_gym.validation import require_positive
+from defmanip_gym.wrappers.actions import finite_actions
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling, NuMaxVectorActionScaling
-from defmanip_gym.wrappers.transport import finite_actions, transport_config
+from defmanip_gym.wrappers.transport import transport_config
 
 if TYPE_CHECKING:
     from defmanip_gym.envs.vector import DeformTransportVectorEnv

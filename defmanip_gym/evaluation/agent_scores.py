@@ -21,10 +21,10 @@ from defmanip_gym.baselines.learned.families import (
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.comparison import RECORD_FOLDER
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import CERTIFICATE_OPTION, Certificates
 from defmanip_gym.evaluation.controllers import Learned
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.jobs import job_fingerprint
+from defmanip_gym.evaluation.protection import Certificates, protection_named
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.statistics import interquartile_mean
 from defmanip_gym.evaluation.store import RecordFolder
@@ -35,7 +35,7 @@ _SCORING_OUTPUT = Path("results/agents")
 
 def contestant_name(family: str, card: AgentCard) -> str:
     """Return who a card's scores are of: the agent under a certificate if it learned under one."""
-    return family if card.certificate is None else f"{family}/{CERTIFICATE_OPTION}"
+    return family if card.certificate is None else f"{family}/{card.certificate}"
 
 
 def suite_score(records: Sequence[EpisodeRecord]) -> SuiteScore:
@@ -119,9 +119,9 @@ def _scores(
 ) -> dict[str, SuiteScore]:
     """Return an agent's scores by suite, empty if it did not take part."""
     card, folder = actor.card, RecordFolder(results / RECORD_FOLDER)
-    certificate = None if card.certificate is None else certificates.named(CERTIFICATE_OPTION)
+    protection = protection_named(card.certificate or "", certificates)
     is_residual = card.residual_authority_m_s2 is not None
-    controller = Learned(actor, certificate if is_residual else None)
+    controller = Learned(actor, protection.certificate if is_residual and protection else None)
     scores = {}
     for suite in SUITES:
         entry = Entry(
@@ -130,7 +130,7 @@ def _scores(
             family="learned",
             member=str(card.seed),
         )
-        records = folder.read(entry, job_fingerprint(suite, controller, certificate))
+        records = folder.read(entry, job_fingerprint(suite, controller, protection))
         if records:
             scores[suite.name] = suite_score(records)
     return scores

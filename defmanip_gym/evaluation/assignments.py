@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import Contestant, Member
+from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.jobs import Job, JobResult, job_fingerprint
 from defmanip_gym.evaluation.records import EpisodeRecord
@@ -73,7 +73,7 @@ def _assignment(
     suite: Suite, contestant: Contestant, member: Member, folder: RecordFolder, threads: int
 ) -> Assignment:
     whole = suite_named(suite.name)
-    identity = job_fingerprint(whole, member.controller, contestant.certificate)
+    identity = job_fingerprint(whole, member.controller, contestant.protection)
     entry = Entry(
         suite=suite.name,
         contestant=contestant.name,
@@ -87,7 +87,7 @@ def _assignment(
         job=Job(
             entry=entry,
             controller=member.controller,
-            certificate=contestant.certificate,
+            protection=contestant.protection,
             suite=replace(suite, scenarios=missing),
             traced=_traced(whole) if is_first else (),
             num_threads=threads,

@@ -15,14 +15,14 @@ from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.assignments import assignments
 from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.config import ComparisonConfig
+from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.contestants import (
-    Certificates,
-    Contestant,
     agent_contestants,
     standard_contestants,
     standard_names,
 )
 from defmanip_gym.evaluation.outputs import print_results, write_outputs
+from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.store import RecordFolder, remove_leftovers
 from defmanip_gym.evaluation.suites import suite_named

@@ -1,9 +1,9 @@
-"""Who takes part in a comparison, what each knows, and under which certificate each runs."""
+"""Who takes part in a comparison, what each knows, and inside which safety filter each runs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from defmanip_gym.baselines.learned.actor import MlpActor
@@ -18,92 +18,66 @@ from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation.colours import GUEST_COLOURS, family_colours
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
+from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import (
-    ControllerSpec,
     Learned,
     Random,
     Sb3Zip,
     Tanner,
     Zero,
 )
-from defmanip_gym.evaluation.entry import SOLE_MEMBER, Family
+from defmanip_gym.evaluation.entry import SOLE_MEMBER
+from defmanip_gym.evaluation.protection import (
+    Certificates,
+    StorageProtection,
+    protection_named,
+)
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import DESIGN_DAMPING
-from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
+from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 from defmanip_gym.validation import require_choice
 
-# The option that every controller gets; the paper's controller shows two more.
-CERTIFICATE_OPTION = "phase_plane"
-_ANALYTIC = ("tanner", "tanner/phase_plane", "tanner/l1", "tanner/tanner")
+# The filter that every controller gets; the paper's controller shows what its own idea costs.
+FILTER_OPTION = "storage"
+_ANALYTIC = (
+    "tanner",
+    *(f"tanner/{method}" for method in STORAGE_FILTERS),
+    "tanner/phase_plane",
+    "tanner/l1",
+    "tanner/tanner",
+)
+_CERTIFICATES = ("phase_plane", "l1", "tanner")
+_OPTIONS = (*STORAGE_FILTERS, *_CERTIFICATES)
 _ACTION_SIZE = 3
 _OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance"})  # env_kwargs
-_WRAPPER_KNOWS = "the wrapper knows the nominal beam"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Member:
-    """One of a contestant's controllers: of a learned one, the result of one training.
-
-    Attributes:
-        name: seed of the training; ``SOLE_MEMBER`` where there is none or nobody knows it.
-        controller: how to make it.
-    """
-
-    name: str
-    controller: ControllerSpec
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contestant:
-    """A controller in a comparison, with the certificate that is enforced on it.
-
-    Attributes:
-        name: unique; a part after a slash names the certificate.
-        family: what kind of controller it is.
-        description: one sentence for the report.
-        privileged: what it knows beyond the observation.
-        colour: of its lines in plots, ``#rrggbb``.
-        members: its controllers; one unless it was trained several times.
-        certificate: enforced by the ν_max wrapper; None runs without the wrapper.
-    """
-
-    name: str
-    family: Family
-    description: str
-    privileged: str
-    colour: str
-    members: tuple[Member, ...]
-    certificate: Certificate | None = None
-
-
-class Certificates:
-    """Certificates for the nominal beam under ``TRANSPORT_CONDITIONS``, made when asked for."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, Certificate] = {}
-
-    def named(self, method: str) -> Certificate:
-        """Return the certificate of a method; the paper's is for its own design damping."""
-        if method not in self._made:
-            beam = NOMINAL_BEAM
-            if method == "tanner":
-                beam = replace(beam, damping=DESIGN_DAMPING)
-            self._made[method] = certify(beam, method=method, conditions=TRANSPORT_CONDITIONS)
-        return self._made[method]
+_WRAPPER_KNOWS = "the filter knows the nominal beam"
+_FILTER_KNOWS = f"{_WRAPPER_KNOWS}, how far others may differ, and noise and delay"
 
 
 def standard_names() -> tuple[str, ...]:
     """Return the names of the contestants of the standard comparison, in order."""
-    learned = (
-        name for family in shipped_families() for name in (family, f"{family}/{CERTIFICATE_OPTION}")
+    return ("zero", "random", *_ANALYTIC, *(n for f in shipped_families() for n in _shown(f)))
+
+
+def _shown(family: str) -> tuple[str, ...]:
+    """Return a family's names: alone, inside the filter, inside what it learned in."""
+    trained_in = load_family(family)[0].card.certificate
+    options = (
+        (FILTER_OPTION,) if trained_in in (None, FILTER_OPTION) else (FILTER_OPTION, trained_in)
     )
-    return ("zero", "random", *_ANALYTIC, *learned)
+    return (family, *(f"{family}/{option}" for option in options))
+
+
+def known_names() -> tuple[str, ...]:
+    """Return the names of all contestants that can be asked for, the standard ones first."""
+    every = (f"{base}/{option}" for base in ("tanner", *shipped_families()) for option in _OPTIONS)
+    return tuple(dict.fromkeys((*standard_names(), *every)))
 
 
 def standard_contestants(
     names: Sequence[str], certificates: Certificates, member_limit: int | None = None
 ) -> tuple[Contestant, ...]:
-    """Return contestants of the standard comparison, in its order.
+    """Return contestants in the order of ``known_names``.
 
     Args:
         names: of those wanted.
@@ -115,7 +89,7 @@ def standard_contestants(
         ParameterError: an unknown name.
         AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
-    known = standard_names()
+    known = known_names()
     for name in names:
         require_choice("contestants", name, known)
     return tuple(
@@ -130,7 +104,7 @@ def agent_contestants(
     allow_pickle: bool = False,
     normalization: str | None = None,
 ) -> tuple[Contestant, Contestant]:
-    """Return an agent of the user's, without and with the certificate.
+    """Return an agent of the user's, without and with the safety filter.
 
     Its name ends in a digest of the agent, so that records of another never pass for its own.
 
@@ -154,10 +128,8 @@ def agent_contestants(
     name = f"{folder.name}@{actor.digest}"
     about = f"{actor.card.algorithm} agent made by `{actor.card.command}`"
     plain = _learned(name, (actor,), None, about, GUEST_COLOURS[0], certificates)
-    option = f"{name}/{CERTIFICATE_OPTION}"
-    return plain, _learned(
-        option, (actor,), CERTIFICATE_OPTION, about, GUEST_COLOURS[1], certificates
-    )
+    option = f"{name}/{FILTER_OPTION}"
+    return plain, _learned(option, (actor,), FILTER_OPTION, about, GUEST_COLOURS[1], certificates)
 
 
 def _sb3_contestants(
@@ -178,11 +150,11 @@ def _sb3_contestants(
     )
     return plain, replace(
         plain,
-        name=f"{name}/{CERTIFICATE_OPTION}",
-        description=f"{about}, inside the {CERTIFICATE_OPTION} certificate.",
-        privileged=f"{plain.privileged}; {_WRAPPER_KNOWS}",
+        name=f"{name}/{FILTER_OPTION}",
+        description=f"{about}, inside the {FILTER_OPTION} filter.",
+        privileged=f"{plain.privileged}; {_FILTER_KNOWS}",
         colour=GUEST_COLOURS[1],
-        certificate=certificates.named(CERTIFICATE_OPTION),
+        protection=StorageProtection(FILTER_OPTION),
     )
 
 
@@ -194,12 +166,13 @@ def _standard(name: str, certificates: Certificates, member_limit: int | None) -
         return _tanner(name, method, certificates)
     actors = load_family(base)[:member_limit]
     about = f"Agents of the shipped family {base}, trained with {len(actors)} seeds"
-    colour = family_colours(base)[bool(method)]
+    colour = family_colours(base)[1 + (method in _CERTIFICATES) if method else 0]
     return _learned(name, actors, method or None, about, colour, certificates)
 
 
 def _tanner(name: str, method: str, certificates: Certificates) -> Contestant:
-    certificate = certificates.named(method) if method else None
+    protection = protection_named(method, certificates)
+    certificate = None if protection is None else protection.certificate
     description, privileged, colour = _TANNER[method]
     if certificate is not None:
         description += f": grasp acceleration within {certificate.acceleration_bound:.2g} m/s²"
@@ -210,7 +183,7 @@ def _tanner(name: str, method: str, certificates: Certificates) -> Contestant:
         privileged=privileged,
         colour=colour,
         members=(Member(name=SOLE_MEMBER, controller=Tanner(certificate)),),
-        certificate=certificate,
+        protection=protection,
     )
 
 
@@ -224,19 +197,20 @@ def _learned(
 ) -> Contestant:
     for actor in actors:
         _require_fit(name, actor.card.observation_size, actor.card.action_size)
-    certificate = certificates.named(method) if method else None
+    protection = protection_named(method or "", certificates)
     trained_in = actors[0].card.certificate
     is_residual = actors[0].card.residual_authority_m_s2 is not None
-    # without enforcement the paper's controller under a residual still is the training's
-    below = certificate
-    if certificate is None and trained_in is not None:
+    # outside of a certificate the paper's controller under a residual still is the training's
+    below = None if protection is None else protection.certificate
+    if below is None and trained_in in _CERTIFICATES:
         below = certificates.named(trained_in)
     knows = [_seen_in_training(actors[0].card)]
     if is_residual:
         knows.append("the controller under it knows the nominal robot and beam")
-    if certificate is not None:
-        about += f", inside the {method} certificate"
-        knows.append(_WRAPPER_KNOWS)
+    if protection is not None:
+        is_certificate = protection.certificate is not None
+        about += f", inside the {method} {'certificate' if is_certificate else 'filter'}"
+        knows.append(_WRAPPER_KNOWS if is_certificate else _FILTER_KNOWS)
     return Contestant(
         name=name,
         family="learned",
@@ -250,7 +224,7 @@ def _learned(
             )
             for actor in actors
         ),
-        certificate=certificate,
+        protection=protection,
     )
 
 
@@ -296,6 +270,16 @@ _REFERENCES = {
 _NOMINAL_MODEL = "nominal robot and beam"
 _TANNER = {
     "": ("The paper's controller without certificate", _NOMINAL_MODEL, "#45b5aa"),
+    "storage": (
+        "The paper's controller inside the storage filter: Lemma III.1's V kept below V_σ",
+        f"{_NOMINAL_MODEL}; {_FILTER_KNOWS}",
+        "#12806a",
+    ),
+    "backup": (
+        "The paper's controller inside the backup filter: what a rollout shows to be safe",
+        f"{_NOMINAL_MODEL}; {_FILTER_KNOWS}",
+        "#5a6e2e",
+    ),
     "phase_plane": (
         "The paper's controller under the largest bound that the nonlinear nominal beam allows",
         _NOMINAL_MODEL,

@@ -88,7 +88,7 @@ class CourseRecorder:
             "applied": np.empty((*periods, 3)),
             "reward": np.empty(periods),
         }
-        applies: BoolArray | None = info.get("certificate_applies")
+        applies: BoolArray | None = info.get("filter_applies")
         self._applies = None if applies is None else applies.copy()
         if self._applies is not None:
             self._periods |= {name: np.empty(periods) for name in _INTERVENTIONS}
@@ -117,11 +117,11 @@ class CourseRecorder:
         """
         values = {"requested": requested, "applied": applied, "reward": reward, **info}
         for name, kept in self._periods.items():
-            kept[:, self._steps] = values[name]
+            kept[:, self._steps] = values[_INTERVENTIONS.get(name, name)]
         self._steps += 1
         self._lengths[running] = self._steps
         if self._applies is not None:
-            self._applies[running] = info["certificate_applies"][running]
+            self._applies[running] = info["filter_applies"][running]
         for name, key in _END_FLAGS.items():
             self._ends[name][running] = info[key][running]
         self._keep_moment(observation, info)
@@ -147,7 +147,8 @@ class CourseRecorder:
         self._moments["swing_rate_rad_s"][:, k] = plant.swing_rate
 
 
-_INTERVENTIONS = ("intervened", "intervention_m_s2")  # as in info, under a certificate only
+# by their names in info, inside a safety filter only
+_INTERVENTIONS = {"intervened": "intervened", "intervention_m_s2": "correction_m_s2"}
 _END_FLAGS = {
     "reached_goal": "is_success",
     "left_workspace": "left_workspace",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
-from defmanip_gym.evaluation.controllers import ControllerSpec, certificate_identity
+from defmanip_gym.evaluation.controllers import ControllerSpec
 from defmanip_gym.evaluation.entry import Entry
+from defmanip_gym.evaluation.protection import Protection
 from defmanip_gym.evaluation.rollout import Episode, rollout
 from defmanip_gym.evaluation.store import fingerprint
 from defmanip_gym.evaluation.suites import Suite
-from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.version import __version__
 
 
@@ -20,7 +20,7 @@ class Job:
     Attributes:
         entry: names the results.
         controller: how to make the controller.
-        certificate: enforced on it, or None.
+        protection: around the environment, or None.
         suite: with those scenarios that have no record yet.
         traced: names of the scenarios whose time course is wanted.
         num_threads: physics threads, 0 for one per CPU.
@@ -28,7 +28,7 @@ class Job:
 
     entry: Entry
     controller: ControllerSpec
-    certificate: Certificate | None
+    protection: Protection | None
     suite: Suite
     traced: tuple[str, ...]
     num_threads: int
@@ -45,6 +45,7 @@ class JobResult:
 def run_job(job: Job) -> JobResult:
     """Run a job's episodes, condition by condition, each of them as one batch."""
     episodes: list[Episode] = []
+    protection = job.protection
     for condition in job.suite.conditions:
         scenarios = job.suite.of(condition)
         episodes += rollout(
@@ -53,7 +54,7 @@ def run_job(job: Job) -> JobResult:
             scenarios,
             config=condition.environment,
             horizon_s=job.suite.horizon_s,
-            certificate=job.certificate,
+            safety_filter=None if protection is None else protection.filter_for(condition),
             delay_periods=condition.delay_periods,
             traced=job.traced,
             num_threads=job.num_threads,
@@ -61,15 +62,13 @@ def run_job(job: Job) -> JobResult:
     return JobResult(job=job, episodes=tuple(episodes))
 
 
-def job_fingerprint(
-    suite: Suite, controller: ControllerSpec, certificate: Certificate | None
-) -> str:
+def job_fingerprint(suite: Suite, controller: ControllerSpec, protection: Protection | None) -> str:
     """Identify whatever the records of a job depend on.
 
     Args:
         suite: the whole of it, also where only the first scenarios are run.
         controller: of the job.
-        certificate: of the job.
+        protection: of the job.
     """
     return fingerprint(
         {
@@ -78,6 +77,6 @@ def job_fingerprint(
             "environments": [asdict(condition.environment) for condition in suite.conditions],
             "scenarios": suite.digest,
             "controller": controller.identity,
-            "certificate": certificate_identity(certificate),
+            "certificate": None if protection is None else protection.identity,
         }
     )

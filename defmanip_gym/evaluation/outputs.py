@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import Contestant
+from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report.exports import latex_table, markdown_table, write_csv
 from defmanip_gym.evaluation.report.page import Section, Setting, write_page

@@ -22,10 +22,10 @@ from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.suites import Scenario
 from defmanip_gym.evaluation.traces import Trace, trace_of
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.certificates import Certificate
+from defmanip_gym.theory.filters.safety_filter import SafetyFilter
 from defmanip_gym.validation import require_positive
 from defmanip_gym.wrappers.action_delay import ActionDelay
-from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
+from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -58,7 +58,7 @@ def rollout(
     *,
     config: TransportConfig,
     horizon_s: float,
-    certificate: Certificate | None = None,
+    safety_filter: SafetyFilter | None = None,
     delay_periods: int = 0,
     traced: Collection[str] = (),
     nominal_beam: BeamParams = NOMINAL_BEAM,
@@ -75,8 +75,8 @@ def rollout(
         scenarios: at least one.
         config: the environment; in ``constraint_mode="cost"`` exceeding σ does not end episodes.
         horizon_s: simulated time after which an episode times out.
-        certificate: enforced by the ν_max wrapper; None runs without the wrapper.
-        delay_periods: control periods by which actions, certified ones too, take effect later.
+        safety_filter: around the environment; None runs without one.
+        delay_periods: control periods by which actions, filtered ones too, take effect later.
         traced: names of scenarios whose time course is wanted.
         nominal_beam: what force errors are measured against.
         num_threads: physics threads, 0 for one per CPU.
@@ -91,8 +91,8 @@ def rollout(
     env: gymnasium.vector.VectorEnv[Array, Array, Array] = applied
     if delay_periods:
         env = ActionDelay(env, delay_periods)
-    if certificate is not None:
-        env = NuMaxVectorActionScaling(env, certificate)
+    if safety_filter is not None:
+        env = SafetyFilterVectorWrapper(env, safety_filter)
     observation, info = env.reset(
         seed=[scenario.seed for scenario in scenarios],  # type: ignore[arg-type]
         options={"start": np.array([scenario.start for scenario in scenarios])},

@@ -12,9 +12,9 @@ import numpy as np
 
 from defmanip_gym.envs.deform_transport import DeformTransportEnv
 from defmanip_gym.evaluation.conditions import Condition
-from defmanip_gym.evaluation.contestants import Contestant
+from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.files import write_atomically
-from defmanip_gym.wrappers.action_scaling import ActionScaling
+from defmanip_gym.wrappers.filtering import Filtering
 
 TIMING_FILE = "timings.json"  # in the output folder
 
@@ -22,24 +22,25 @@ _WARM_UP, _SAMPLES = 20, 300
 
 
 def decision_time_s(contestant: Contestant) -> float:
-    """Return the median wall time of ``predict`` on a batch of one, certificate included, s."""
-    config = Condition(name="nominal").environment
+    """Return the median wall time of ``predict`` on a batch of one, safety filter included, s."""
+    condition = Condition(name="nominal")
+    config = condition.environment
     env = DeformTransportEnv(constraint_mode="cost", nominal_beam=config.nominal_beam)
     observation = env.reset(seed=0)[0][None]
     env.close()
     controller = contestant.members[0].controller.build([0])
-    scaling = None
-    if contestant.certificate is not None:
-        scaling = ActionScaling(config, contestant.certificate)
-        scaling.begin(observation, np.array([True]))
+    filtering = None
+    if contestant.protection is not None:
+        filtering = Filtering(config, contestant.protection.filter_for(condition))
+        filtering.begin(observation, np.array([True]))
     state, samples = None, []
     for call in range(_WARM_UP + _SAMPLES):
         episode_start = np.array([call == 0])
         begin = time.perf_counter()
         actions, state = controller.predict(observation, state, episode_start, deterministic=True)
-        if scaling is not None:
-            scaling.scale(actions, observation)
-            scaling.conclude(observation)
+        if filtering is not None:
+            filtering.certify(actions, observation)
+            filtering.conclude(observation)
         samples.append(time.perf_counter() - begin)
     return median(samples[_WARM_UP:])
 

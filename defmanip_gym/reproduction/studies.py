@@ -23,6 +23,7 @@ from defmanip_gym.reproduction.transport import run_transport
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 from defmanip_gym.theory.control.stability import SampledLoop
 from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
 
 ASSUMED_DAMPINGS = (0.1, 0.0, 1.0)
 
@@ -136,7 +137,7 @@ def l1_transport(max_duration_s: float) -> Part:
         [scenario],
         config=config,
         horizon_s=min(_L1_HORIZON_S, max_duration_s),
-        certificate=certificate,
+        safety_filter=nu_max_filter(config, certificate),
         traced=[scenario.name],
     )
     record, trace = episode.record, episode.trace

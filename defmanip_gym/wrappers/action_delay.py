@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from defmanip_gym.validation import require_whole
-from defmanip_gym.wrappers.transport import finite_actions
+from defmanip_gym.wrappers.actions import finite_actions
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -53,9 +53,9 @@ def resting_motions(
     """Draw starts: at rest, the beam straight and within the certificate's initial swing."""
     segments = config.beam.segment_count
     lowest, highest = arm_range(config)
-    swing = _about_zero(rng, certificate.conditions.initial_swing_rad, (count, 1))
+    swing = about_zero(rng, certificate.conditions.initial_swing_rad, (count, 1))
     return Motions(
-        joints=_drawn(rng, lowest, highest, (count, 2)),
+        joints=drawn(rng, lowest, highest, (count, 2)),
         joint_rates=np.zeros((count, 2)),
         base_velocity=np.zeros((count, 2)),
         swing=np.repeat(swing, segments, axis=1),
@@ -72,19 +72,19 @@ def moving_motions(
     has it, and the grasp lifts as fast as the vertical acceleration allows over the arm's length.
     """
     kinematics = ArmKinematics(config.robot)
-    joints = _drawn(rng, *arm_range(config), (count, 2))
+    joints = drawn(rng, *arm_range(config), (count, 2))
     pitch = joints @ JOINT_TO_PITCH.T
     reach = kinematics.reach_and_height(pitch)[:, 0]
     lifting = _fastest_lift(config, certificate)
     rates = np.stack(
         (
             0.5 * rng.random(count) * (config.goal_reach_and_height_m[0] - reach),
-            _about_zero(rng, lifting, (count,)),
+            about_zero(rng, lifting, (count,)),
         ),
         axis=-1,
     )
     pitch_rate = np.linalg.solve(kinematics.jacobian(pitch), rates[..., None])[..., 0]
-    forward = _about_zero(rng, config.task.max_speed_m_s, (count,))
+    forward = about_zero(rng, config.task.max_speed_m_s, (count,))
     swing, swing_rate = _swings(config, certificate, count, rng)
     return Motions(
         joints=joints,
@@ -92,7 +92,7 @@ def moving_motions(
         base_velocity=np.stack(
             (
                 forward - rates[:, 0],
-                _about_zero(rng, certificate.commanded_yaw_rate_rad_s, (count,)),
+                about_zero(rng, certificate.commanded_yaw_rate_rad_s, (count,)),
             ),
             axis=-1,
         ),
@@ -129,7 +129,7 @@ def _swings(
     growth = max(certificate.sigma_rad / float(certified_peaks[: linear.count].max()), 1.0)
     shape = (count, 2 * linear.count)
     phases = np.exp(2j * np.pi * rng.random(shape))
-    state = ((_drawn(rng, 0.0 * modal_peaks, modal_peaks, shape) * phases) @ modes.T).real
+    state = ((drawn(rng, 0.0 * modal_peaks, modal_peaks, shape) * phases) @ modes.T).real
     share = (np.abs(state) / peaks).max(axis=1, keepdims=True)
     state *= growth / np.maximum(share, 1.0)
     return state[:, : linear.count], state[:, linear.count :]
@@ -149,15 +149,14 @@ def _reach(linear: LinearizedObject, certificate: Certificate) -> tuple[Array, A
     return peaks, modal_peaks + np.abs(into_modes @ start)[:, 0], modes
 
 
-def _drawn(
-    rng: np.random.Generator, lowest: Array, highest: Array, shape: tuple[int, ...]
-) -> Array:
-    """Draw numbers from [lowest, highest], half of them ends."""
+def drawn(rng: np.random.Generator, lowest: Array, highest: Array, shape: tuple[int, ...]) -> Array:
+    """Draw numbers of a shape from [lowest, highest], half of them ends."""
     share = rng.random(shape)
     share = np.where(rng.random(shape) < _EDGE_SHARE, np.round(share), share)
-    drawn: Array = lowest + share * (highest - lowest)
-    return drawn
+    values: Array = lowest + share * (highest - lowest)
+    return values
 
 
-def _about_zero(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
-    return _drawn(rng, np.array(-size), np.array(size), shape)
+def about_zero(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
+    """Draw numbers of a shape from [-size, size], half of them ends."""
+    return drawn(rng, np.array(-size), np.array(size), shape)

@@ -1,6 +1,6 @@
-"""Whether a certificate's conditions hold in an environment, and why not, in words.
+"""Whether a filter's promise holds in an environment, and why not, in words.
 
-A certificate covers an object under conditions; an environment is a robot with errors, noise,
+A filter covers an object under conditions; an environment is a robot with errors, noise,
 disturbances, and whatever a user put between wrapper and robot. What the configuration tells is
 judged before the first step, what only the motion tells while it lasts.
 """
@@ -8,49 +8,53 @@ judged before the first step, what only the motion tells while it lasts.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
-from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.certificates.certificate import Certificate
-from defmanip_gym.theory.certificates.error_budget import ErrorBudget
-from defmanip_gym.wrappers.admissible_motions import arm_range
-from defmanip_gym.wrappers.certified_motion import GraspMotion
-from defmanip_gym.wrappers.realization import realization_errors
+from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
+from defmanip_gym.theory.filters.safety_filter import SafetyFilter
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.wrappers.nu_max_terms import NuMaxTerms
+from defmanip_gym.wrappers.storage_terms import StorageTerms
+from defmanip_gym.wrappers.terms import Terms
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_ROUNDING_RAD = 1e-9
-# a Gaussian leaves six standard deviations once in 5e8 draws
-_NOISE_BOUND = 6.0
 
-
-def require_fit(config: TransportConfig, certificate: Certificate) -> None:
-    """Raise CertificateError unless the certificate is for such an environment at all."""
+def require_fit(config: TransportConfig, safety_filter: SafetyFilter) -> None:
+    """Raise CertificateError unless the filter is for such an environment at all."""
     if config.control_mode != "task":
         raise CertificateError(
             "control_mode",
             config.control_mode,
             "'task'",
-            "A certificate bounds the task acceleration; make the environment in task mode.",
+            "A filter changes the task acceleration; make the environment in task mode.",
         )
-    if certificate.coordinate_count != config.beam.segment_count:
+    if safety_filter.segment_count != config.beam.segment_count:
         raise CertificateError(
-            "certificate.coordinate_count",
-            certificate.coordinate_count,
+            "segment_count of the filter's object",
+            safety_filter.segment_count,
             f"{config.beam.segment_count}, as in the environment",
-            "Compute the certificate for the environment's beam.",
+            "Make it for the environment's beam.",
         )
-    if certificate.sigma_rad > config.sigma_rad:
+    if safety_filter.sigma_rad > config.sigma_rad:
         raise CertificateError(
-            "certificate.sigma_rad",
-            certificate.sigma_rad,
+            "sigma_rad of the filter",
+            safety_filter.sigma_rad,
             f"at most the environment's {config.sigma_rad:.6g}",
-            "Certify with the environment's sigma_rad.",
+            "Make it with the environment's sigma_rad.",
+        )
+    if safety_filter.task.control_period_s != config.task.control_period_s:
+        raise CertificateError(
+            "task.control_period_s of the filter",
+            safety_filter.task.control_period_s,
+            f"{config.task.control_period_s}, the environment's",
+            "Make it with the environment's task.",
         )
 
 
@@ -59,31 +63,35 @@ class Applicability:
 
     Args:
         config: the environment's definition.
-        certificate: that is enforced.
+        safety_filter: that is enforced.
         count: n.
-        action_changers: names of wrappers that may change the certified actions.
+        action_changers: names of wrappers that may change the allowed actions.
+        delay_periods: control periods until an action takes effect.
 
     Attributes:
-        reasons: why the certificate does not cover the episodes, in words, (n,); empty where it
-            does as far as is known by now.
+        reasons: why the filter's promise does not cover the episodes, in words, (n,); empty where
+            it does as far as is known by now.
     """
 
-    remembers = ("words",)
+    remembers = ("words", "_is_outside")
 
     def __init__(
         self,
         config: TransportConfig,
-        certificate: Certificate,
+        safety_filter: SafetyFilter,
         count: int = 1,
         action_changers: tuple[str, ...] = (),
+        delay_periods: int = 0,
     ) -> None:
-        self._config, self._certificate = config, certificate
-        self._action_changers = action_changers
+        self._config, self._filter = config, safety_filter
+        self._action_changers, self._delay_periods = action_changers, delay_periods
+        self._terms = _terms(config, safety_filter)
         self.reasons = np.full(count, "", dtype=object)
+        self._is_outside = np.zeros(count, dtype=bool)
 
     @property
     def applies(self) -> BoolArray:
-        """Whether the certificate covers the episodes as far as is known by now, (n,)."""
+        """Whether the promise covers the episodes as far as is known by now, (n,)."""
         return self.reasons == ""
 
     @property
@@ -95,102 +103,73 @@ class Applicability:
     def words(self, words: list[str]) -> None:
         self.reasons = np.array(words, dtype=object)
 
-    def begin(self, swing: Array, motion: GraspMotion, started: BoolArray) -> None:
+    def begin(self, observation: Array, memory: Any, started: BoolArray) -> None:
         """Judge episodes at their start.
 
         Args:
-            swing: as observed, (n, N) rad.
-            motion: of the grasp.
+            observation: the first ones, (n, size).
+            memory: the filter's, which has begun.
             started: which episodes start, (n,).
         """
         self.reasons[started] = self.configuration_reason
-        for i in np.flatnonzero(started & self.applies):
-            self.reasons[i] = self._start_reason(np.abs(swing[i]).max(), motion.joints[i])
+        self._is_outside[started] = False
+        for i in np.flatnonzero(started & self.applies).tolist():
+            self.reasons[i] = self._terms.start_reason(observation, i)
+        if (started & self.applies).any():
+            self._is_outside |= started & self.applies & ~self._filter.inside(observation, memory)
+            self.reasons[started & self._is_outside] = self._terms.outside_reason
 
-    def watch(self, surprise: Array, motion: GraspMotion, idle: BoolArray | None) -> None:
-        """Judge a control period by what it brought, (n, 3) m/s² of surprise."""
-        if not self.applies.any():
+    def watch(
+        self, surprise: Array, observation: Array, memory: Any, idle: BoolArray | None
+    ) -> None:
+        """Judge a control period by what it brought.
+
+        Args:
+            surprise: accelerations beside those foreseen, (n, 3) m/s².
+            observation: at its end, (n, size).
+            memory: the filter's, which has concluded it.
+            idle: episodes that only go along, (n,).
+        """
+        if not (self._is_outside | self.applies).any():
             return
-        room = self._budget.needed(np.abs(surprise[:, 0]), np.abs(surprise[:, 2]), self._stray_m_s)
-        lost = ~(room <= self._budget.room_m_s2)
-        turning = np.abs(motion.yaw_rate) > self._certificate.conditions.yaw_rate_rad_s
-        awake = np.ones_like(lost) if idle is None else ~idle
-        for i in np.flatnonzero((lost | turning) & awake & self.applies):
-            self.reasons[i] = (
-                f"it turned at {motion.yaw_rate[i]:.3g} rad/s" + self._allowed_yaw_rate
-                if turning[i]
-                else f"in a control period errors took {room[i]:.3g} m/s²{self._allowed_errors}"
-            )
+        awake = True if idle is None else ~idle
+        broken, reason_of = self._terms.broken(surprise, observation)
+        for i in np.flatnonzero(broken & awake & (self.applies | self._is_outside)).tolist():
+            self.reasons[i], self._is_outside[i] = reason_of(i), False
+        if self._is_outside.any():
+            returned = self._is_outside & self._filter.inside(observation, memory)
+            self.reasons[returned], self._is_outside[returned] = "", False
 
     @cached_property
     def configuration_reason(self) -> str:
-        """Why the certificate covers no episode of this environment; empty if it may."""
-        config, certificate = self._config, self._certificate
-        if not all(certificate.covers(beam) for beam in self._beams):
+        """Why the promise covers no episode of this environment; empty if it may."""
+        if not all(self._filter.covers(beam) for beam in self._beams):
             return "it was not computed for the beams that are carried"
-        if certificate.proof == "none":
-            return f"the bound of method {certificate.method!r} is not proven"
+        if self._filter.proof == "none":
+            return f"what {self._terms.method!r} allows is not proven"
         if self._action_changers:
-            return f"{' and '.join(self._action_changers)} may change the certified actions"
-        if self._start_noise_rad > certificate.conditions.initial_swing_rad:
-            return f"the swing at the start is measured to within {self._start_noise_rad:.3g} rad"
-        if certificate.proof == "linear":
-            return "the bound is proven for the linearized beam only"
+            return f"{' and '.join(self._action_changers)} may change the allowed actions"
+        if self._delay_periods != self._terms.delay_periods:
+            return (
+                f"actions take effect {self._delay_periods} control periods late (ActionDelay); it "
+                f"provides for {self._terms.delay_periods}"
+            )
         try:
-            errors = realization_errors(config, certificate)
+            return self._terms.configuration_reason
         except CertificateError as error:
             return f"its errors are not known: {error}"
-        if errors.yaw_rate_rad_s > certificate.conditions.yaw_rate_rad_s:
-            return f"it may turn at {errors.yaw_rate_rad_s:.3g} rad/s" + self._allowed_yaw_rate
-        if not errors.room_m_s2 <= self._budget.room_m_s2:
-            return (
-                f"robot, beam, periods and beliefs of this environment make errors of up to "
-                f"{errors.room_m_s2:.3g} m/s²{self._allowed_errors}"
-            )
-        return ""
-
-    def _start_reason(self, swing_rad: float, joints: Array) -> str:
-        conditions, config = self._certificate.conditions, self._config
-        noise = self._start_noise_rad
-        if swing_rad + noise > conditions.initial_swing_rad + _ROUNDING_RAD:
-            measured = f", measured to within {noise:.3g} rad" if noise else ""
-            return (
-                f"the beam started at {swing_rad:.3g} rad{measured}; the certificate provides for "
-                f"{conditions.initial_swing_rad:.3g} rad"
-            )
-        lowest, highest = arm_range(config)
-        if not (
-            (lowest - _ROUNDING_RAD <= joints).all() and (joints <= highest + _ROUNDING_RAD).all()
-        ):
-            return (
-                f"the arm started at ({joints[0]:.3g}, {joints[1]:.3g}) rad, beyond task.start and "
-                "task.goal, between which the errors were bounded"
-            )
-        return ""
 
     @property
-    def _beams(self) -> tuple[BeamParams, ...]:
-        """The beams that may be carried: what a certificate covers are intervals, so ends tell."""
+    def _beams(self) -> tuple[Any, ...]:
+        """The beams that may be carried: what a filter covers are intervals, so ends tell."""
         return self._config.beam_ranges.extremes(self._config.beam)
 
-    @cached_property
-    def _budget(self) -> ErrorBudget:
-        return ErrorBudget.of(
-            self._certificate, self._beams, physics_period_s=self._config.task.physics_period_s
-        )
 
-    @property
-    def _start_noise_rad(self) -> float:
-        return _NOISE_BOUND * self._config.disturbance.swing_sensor_noise_rad
-
-    @property
-    def _stray_m_s(self) -> float:
-        return realization_errors(self._config, self._certificate).stray_m_s
-
-    @property
-    def _allowed_errors(self) -> str:
-        return f"; the certificate has room for {self._budget.room_m_s2:.3g} m/s²"
-
-    @property
-    def _allowed_yaw_rate(self) -> str:
-        return f"; the certificate provides for {self._certificate.conditions.yaw_rate_rad_s:.3g}"
+def _terms(config: TransportConfig, safety_filter: SafetyFilter) -> Terms:
+    if isinstance(safety_filter, NuMaxFilter):
+        return NuMaxTerms(config, safety_filter.certificate)
+    if isinstance(safety_filter, StorageFilter):
+        return StorageTerms(config, safety_filter)
+    raise CertificateError(
+        "safety_filter", safety_filter, "a filter of this package's family", "See make_filter."
+    )

@@ -5,16 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
-import numpy as np
-from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.state import wrappers
-from defmanip_gym.errors import ActionError, CertificateError
-from defmanip_gym.validation import number_array
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from defmanip_gym.errors import CertificateError
+from defmanip_gym.wrappers.action_delay import ActionDelay
 
 _OBSERVATION_WRAPPERS = (gymnasium.ObservationWrapper, gymnasium.vector.VectorObservationWrapper)
 _ACTION_WRAPPERS = (gymnasium.ActionWrapper, gymnasium.vector.VectorActionWrapper)
@@ -52,7 +47,7 @@ def transport_config(env: Any) -> TransportConfig:
                 "env",
                 layer,
                 "an environment whose observations are as it made them",
-                "Put observation wrappers around NuMaxActionScaling, not inside it.",
+                "Put observation wrappers around the safety filter, not inside it.",
             )
     config = getattr(env.unwrapped, "config", None)
     if not isinstance(config, TransportConfig):
@@ -65,10 +60,19 @@ def transport_config(env: Any) -> TransportConfig:
 def action_changers(env: Any) -> tuple[str, ...]:
     """Return the names of the wrappers of ``env`` that may change an action on its way.
 
-    Those are all but Gymnasium's that do not, wrappers without a ``step`` of their own, and those
-    that say so by an attribute ``keeps_actions`` that is true.
+    Those are all but Gymnasium's that do not, wrappers without a ``step`` of their own, those that
+    say so by an attribute ``keeps_actions`` that is true, and ``ActionDelay``, which filters know.
     """
-    return tuple(type(layer).__name__ for layer in wrappers(env) if not _keeps_actions(layer))
+    return tuple(
+        type(layer).__name__
+        for layer in wrappers(env)
+        if not (_keeps_actions(layer) or isinstance(layer, ActionDelay))
+    )
+
+
+def delay_periods(env: Any) -> int:
+    """Return by how many control periods the wrappers of ``env`` hold actions back."""
+    return sum(layer.periods for layer in wrappers(env) if isinstance(layer, ActionDelay))
 
 
 def _keeps_actions(layer: Any) -> bool:
@@ -79,23 +83,3 @@ def _keeps_actions(layer: Any) -> bool:
         return False
     is_known = kind.__name__ in _KEEPING.get(kind.__module__, ())
     return is_known or kind.step in _STEPS
-
-
-def finite_actions(actions: Any, awake: BoolArray, shape: tuple[int, ...] = (3,)) -> Array:
-    """Return the actions of a batch as numbers, (n, ...), zero where they do not matter.
-
-    Args:
-        actions: as given to an environment.
-        awake: whose action matters, (n,).
-        shape: of one action.
-
-    Raises:
-        ActionError: actions that are not finite or of another shape.
-    """
-    shape = (len(awake), *shape)
-    values = number_array(actions)
-    if values is not None and values.shape == shape:
-        values[~awake] = 0.0
-    if values is None or values.shape != shape or not np.isfinite(values).all():
-        raise ActionError("action", actions, f"finite numbers of shape {shape}", "Check them.")
-    return values

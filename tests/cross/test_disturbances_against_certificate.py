@@ -9,7 +9,7 @@ from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.wrappers.applicability import Applicability
-from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
+from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling, nu_max_filter
 
 LAYOUT = ObservationLayout(1)
 PERIOD_S, LIMIT_M_S2 = TaskParams().control_period_s, TaskParams().max_acceleration_m_s2
@@ -86,6 +86,7 @@ def test_wild_commands_stay_within_the_room_and_need_it(make_batch):
 
 def test_what_is_not_provided_for_exceeds_the_room(make_batch):
     condition = Condition(name="x", disturbance=STRONG)
-    reason = Applicability(condition.environment, CERTIFICATE).configuration_reason
+    config = condition.environment
+    reason = Applicability(config, nu_max_filter(config, CERTIFICATE)).configuration_reason
     assert "provides for" in reason or "has room for" in reason
     assert surprises(condition, make_batch)[0][..., 0].max() > FORWARD_ROOM

@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from defmanip_gym.evaluation.contestants import Certificates
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.plots.phase import reachable_set
+from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import suite_named
 from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
 
 LAYOUT = ObservationLayout(1)
 
@@ -32,7 +33,7 @@ def test_a_policy_that_pumps_the_swing_stays_in_the_certificates_set():
         scenarios,
         config=scenarios[0].condition.environment,
         horizon_s=20.0,
-        certificate=certificate,
+        safety_filter=nu_max_filter(scenarios[0].condition.environment, certificate),
         traced=[scenario.name for scenario in scenarios],
     )
     for episode in episodes:

@@ -7,19 +7,19 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from episodes import record
 
-from defmanip_gym.evaluation.contestants import Contestant, Member
+from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Zero
 from defmanip_gym.evaluation.entry import SOLE_MEMBER
+from defmanip_gym.evaluation.protection import Protection
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.statistics.episode_table import EpisodeTable, tabulate
-from defmanip_gym.theory.certificates import Certificate
 
 
 def contestant(
     name: str,
     family: str,
     *,
-    certificate: Certificate | None = None,
+    protection: Protection | None = None,
     members: tuple[str, ...] = (SOLE_MEMBER,),
     description: str = "Does something.",
 ) -> Contestant:
@@ -30,7 +30,7 @@ def contestant(
         privileged="nothing",
         colour="#aa3300",
         members=tuple(Member(name=member, controller=Zero()) for member in members),
-        certificate=certificate,
+        protection=protection,
     )
 
 

@@ -11,6 +11,7 @@ from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import NOMINAL, suite_named
 from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
 
 SCENARIO = suite_named("nominal").scenarios[0]
 ENTRY = Entry(suite="nominal", contestant="zero/l1", family="reference")
@@ -23,7 +24,7 @@ def flag(condition, certificate):
         [replace(SCENARIO, condition=condition)],
         config=condition.environment,
         horizon_s=0.04,
-        certificate=certificate,
+        safety_filter=certificate and nu_max_filter(condition.environment, certificate),
         delay_periods=condition.delay_periods,
     )
     return episode.record.certificate_applies

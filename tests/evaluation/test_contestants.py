@@ -12,14 +12,16 @@ from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import load_agent, load_family, shipped_families
 from defmanip_gym.errors import AgentFileError, ParameterError
-from defmanip_gym.evaluation import contestants
+from defmanip_gym.evaluation import protection
 from defmanip_gym.evaluation.contestants import (
-    Certificates,
+    FILTER_OPTION,
     agent_contestants,
+    known_names,
     standard_contestants,
     standard_names,
 )
 from defmanip_gym.evaluation.controllers import RandomPerEpisode
+from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.observation import ObservationLayout
 
 SIZE = ObservationLayout(1).size
@@ -43,17 +45,28 @@ def agent(card_changes=(), size=SIZE):
     )
 
 
-def test_every_controller_gets_the_same_certificate_options(everyone):
+def test_every_controller_gets_the_same_filter(everyone):
     names = [contestant.name for contestant in everyone]
     for controller in ("tanner", *shipped_families()):
-        assert controller in names and f"{controller}/phase_plane" in names
-    assert {"zero", "random", "tanner/l1", "tanner/tanner"} < set(names)
+        assert controller in names and f"{controller}/{FILTER_OPTION}" in names
+    assert {"zero", "random", "tanner/phase_plane", "tanner/l1", "tanner/tanner"} < set(names)
 
 
-def test_names_tell_the_certificate_and_families_the_kind(everyone):
+def test_whoever_learned_inside_a_certificate_is_shown_inside_it(everyone):
+    assert "residual/phase_plane" in [contestant.name for contestant in everyone]
+
+
+def test_every_controller_can_be_asked_for_inside_every_filter():
+    names = known_names()
+    for controller in ("tanner", *shipped_families()):
+        for method in ("storage", "phase_plane", "l1", "tanner"):
+            assert f"{controller}/{method}" in names
+
+
+def test_names_tell_the_filter_and_families_the_kind(everyone):
     for contestant in everyone:
         _, _, method = contestant.name.partition("/")
-        enforced = contestant.certificate
+        enforced = contestant.protection
         assert (enforced.method if enforced else "") == method
         base = contestant.name.partition("/")[0]
         kinds = {"zero": "reference", "random": "reference", "tanner": "analytic"}
@@ -80,7 +93,7 @@ def test_a_learned_contestant_has_a_member_for_each_seed(everyone):
     by_name = {contestant.name: contestant for contestant in everyone}
     for family in shipped_families():
         seeds = [str(actor.card.seed) for actor in load_family(family)]
-        for name in (family, f"{family}/phase_plane"):
+        for name in (family, f"{family}/{FILTER_OPTION}"):
             assert [member.name for member in by_name[name].members] == seeds
         (limited,) = standard_contestants([family], Certificates(), member_limit=1)
         assert [member.name for member in limited.members] == seeds[:1]
@@ -103,7 +116,7 @@ def test_only_certificates_that_are_needed_are_computed(monkeypatch):
     def fail(*arguments, **options):
         raise AssertionError("computed a certificate")
 
-    monkeypatch.setattr(contestants, "certify", fail)
+    monkeypatch.setattr(protection, "certify", fail)
     standard_contestants(["zero", "random", "tanner"], Certificates())
     with pytest.raises(AssertionError):
         standard_contestants(["tanner/l1"], Certificates())
@@ -129,8 +142,8 @@ def test_agents_of_one_folder_name_stay_apart(tmp_path):
     pairs = [agent_contestants(folder, Certificates()) for folder in folders]
     assert len({contestant.name for pair in pairs for contestant in pair}) == 4
     plain, certified = pairs[0]
-    assert certified.name == f"{plain.name}/phase_plane"
-    assert plain.certificate is None and certified.certificate is not None
+    assert certified.name == f"{plain.name}/{FILTER_OPTION}"
+    assert plain.protection is None and certified.protection is not None
 
 
 def test_an_agent_for_other_observations_is_refused(tmp_path):

@@ -11,7 +11,8 @@ import pytest
 
 from defmanip_gym.evaluation import comparison, seeds
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import CERTIFICATE_OPTION, Certificates, standard_names
+from defmanip_gym.evaluation.contestants import FILTER_OPTION, standard_names
+from defmanip_gym.evaluation.protection import StorageProtection
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.statistics.aggregates import WORST_SHARE
 from defmanip_gym.evaluation.statistics.resampling import RESAMPLES
@@ -21,7 +22,6 @@ from defmanip_gym.task_params import TaskParams
 from defmanip_gym.wrappers.applicability import Applicability
 
 PAGE = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
-CERTIFICATES = Certificates()
 
 
 def row(suite, condition):
@@ -32,9 +32,11 @@ def row(suite, condition):
         force.append(f"{own.force_amplitude_n:g} sin {own.force_frequency_rad_s:g}t")
     noises = ((own.force_sensor_noise_n, "N"), (own.swing_sensor_noise_rad, "rad"))
     factors = (condition.damping_factor, condition.mass_factor, condition.length_factor)
-    certificate = CERTIFICATES.named(CERTIFICATE_OPTION)
-    delayed = ("ActionDelay",) if condition.delay_periods else ()
-    judge = Applicability(condition.environment, certificate, action_changers=delayed)
+    judge = Applicability(
+        condition.environment,
+        StorageProtection(FILTER_OPTION).filter_for(condition),
+        delay_periods=condition.delay_periods,
+    )
     covered = not judge.configuration_reason
     cells = (
         suite.name,

@@ -14,8 +14,8 @@ from suite_records import contestant, suite_records
 
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import Certificates
 from defmanip_gym.evaluation.outputs import print_results, write_outputs
+from defmanip_gym.evaluation.protection import Certificates, protection_named
 from defmanip_gym.evaluation.report.columns import COLUMNS
 
 EVIL = "ppo</script><b>"
@@ -25,12 +25,12 @@ SEEDS = ("0", "1", "2")
 @pytest.fixture(scope="module")
 def comparison(tmp_path_factory):
     folder = tmp_path_factory.mktemp("comparison")
-    certificate = Certificates().named("l1")
+    protection = protection_named("l1", Certificates())
     contestants = (
         contestant("tanner", "analytic", description="5 < 6 & <b>so on</b>"),
-        contestant("tanner/l1", "analytic", certificate=certificate),
+        contestant("tanner/l1", "analytic", protection=protection),
         contestant(EVIL, "learned", members=SEEDS),
-        contestant("ppo/l1", "learned", members=SEEDS, certificate=certificate),
+        contestant("ppo/l1", "learned", members=SEEDS, protection=protection),
         contestant("sac", "learned", members=SEEDS),
     )
     generator = np.random.default_rng(0)

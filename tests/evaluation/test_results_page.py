@@ -14,9 +14,9 @@ from suite_records import contestant, suite_records
 
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import Certificates
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.outputs import write_outputs
+from defmanip_gym.evaluation.protection import Certificates, protection_named
 from defmanip_gym.evaluation.store import RecordFolder
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "make_results.py"
@@ -51,13 +51,13 @@ def benchmark(tmp_path_factory):
             for name, level in LEVELS.items()
         }
         records += suite_records(matrices, suite=suite, conditions=conditions)
-    certificate = Certificates().named("l1")
+    protection = protection_named("l1", Certificates())
     contestants = [
         contestant(
             name,
             "analytic" if "tanner" in name else "learned",
             members=("-",) if "tanner" in name else SEEDS,
-            certificate=certificate if "/" in name else None,
+            protection=protection if "/" in name else None,
         )
         for name in LEVELS
     ]
@@ -104,7 +104,7 @@ def test_broken_certificates_are_told(benchmark, page, write_results, tmp_path):
     bad = {"outcome": "violation", "success": False, "violated": True}
     records[0] = replace(records[0], **bad, time_to_goal_s=None)
     config = replace(benchmark[1], output=tmp_path / "b", suites=("nominal",))
-    who = contestant("tanner/l1", "analytic", certificate=Certificates().named("l1"))
+    who = contestant("tanner/l1", "analytic", protection=protection_named("l1", Certificates()))
     write_outputs(config, [who], records)
     store(tmp_path / "b", records)
     text = write_results(tmp_path / "b", tmp_path).read_text()

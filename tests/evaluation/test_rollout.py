@@ -16,6 +16,7 @@ from defmanip_gym.evaluation.suites import NOMINAL, Scenario, suite_named
 from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
 
 PAPER = Condition(name="paper", disturbance=PAPER_DISTURBANCE)
 CONFIG = PAPER.environment
@@ -57,7 +58,8 @@ def test_a_record_does_not_depend_on_the_rest_of_the_batch(build, delay_periods)
 
     def records_of(batch, **arguments):
         controller = build([scenario.seed for scenario in batch])
-        settings = dict(config=noisy, horizon_s=2.0, certificate=certificate)
+        enforced = nu_max_filter(noisy, certificate)
+        settings = dict(config=noisy, horizon_s=2.0, safety_filter=enforced)
         return run(controller, batch, delay_periods=delay_periods, **settings, **arguments)[0]
 
     together = records_of(scenarios, num_threads=2)
@@ -109,7 +111,8 @@ def test_the_analytic_controller_reaches_the_goal():
 def test_the_wrapper_intervenes_and_is_counted():
     certificate = certify(NOMINAL_BEAM, conditions=TRANSPORT_CONDITIONS)
     full = Constant(1.0, 0.0, 0.0)
-    wrapped, traces = run(full, [PAPER_SCENARIO], certificate=certificate, traced={"paper"})
+    enforced = nu_max_filter(CONFIG, certificate)
+    wrapped, traces = run(full, [PAPER_SCENARIO], safety_filter=enforced, traced={"paper"})
     record = wrapped["paper"]
     assert record.interventions == 1.0 and record.certificate_applies
     assert record.mean_intervention_m_s2 > 2.0

@@ -18,7 +18,8 @@ from sb3_models import Spaces, poisoned, saved
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation import comparison, suites
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
-from defmanip_gym.evaluation.contestants import Certificates, agent_contestants
+from defmanip_gym.evaluation.contestants import agent_contestants
+from defmanip_gym.evaluation.protection import Certificates
 
 OBSERVATIONS = np.random.default_rng(0).normal(size=(5, 22))
 
@@ -63,7 +64,7 @@ def test_a_strangers_zip_is_refused_without_running_anything(tmp_path):
     assert not trace.exists() and not (tmp_path / "out").exists()
 
 
-def test_an_allowed_zip_runs_without_and_with_certificate_in_any_process(tmp_path):
+def test_an_allowed_zip_runs_without_and_with_filter_in_any_process(tmp_path):
     path = tmp_path / "model.zip"
     saved(path)
     run_comparison(config(tmp_path, path))
@@ -72,7 +73,7 @@ def test_an_allowed_zip_runs_without_and_with_certificate_in_any_process(tmp_pat
     assert len(here) == 4 and here == there
     names = {contestant for contestant, _ in here}
     assert {name.partition("@")[0] for name in names} == {"model"}
-    assert {name.partition("/")[2] for name in names} == {"", "phase_plane"}
+    assert {name.partition("/")[2] for name in names} == {"", "storage"}
     assert {row["family"] for row in here.values()} == {"learned"}
 
 

@@ -57,7 +57,7 @@ def test_the_leading_ones_are_named_where_nobody_wins():
     ],
 )
 @pytest.mark.parametrize(
-    ("suffix", "label"), [("", "Without a certificate"), ("/l1", "Inside a certificate")]
+    ("suffix", "label"), [("", "Without a filter"), ("/l1", "Inside a filter")]
 )
 def test_whether_learning_beats_analysis_is_always_said(learned, claim, suffix, label):
     matrices = {f"ppo{suffix}": scores(learned, 1, 5), f"tanner{suffix}": scores(0.40, 2)}
@@ -85,7 +85,7 @@ def test_nobody_is_praised_where_nobody_arrives():
     matrices = {"ppo": nothing, "tanner": nothing}
     text = text_of(matrices)
     assert "Among all contestants, nobody reached the goal within σ." in text
-    assert "Without a certificate, neither learned nor analytic contestants reached" in text
+    assert "Without a filter, neither learned nor analytic contestants reached" in text
     assert headline(analysis_of(matrices).overall) == "nobody reached the goal within σ"
 
 
@@ -94,7 +94,7 @@ def test_single_runs_of_single_scenarios_carry_no_claim():
     conditions = ["calm", "windy"]
     text = text_of(matrices, conditions=conditions)
     assert "nobody can be called best: ppo scores highest (0.500)" in text
-    assert "Without a certificate, nothing is claimed: ppo differs from tanner by +0.100" in text
+    assert "Without a filter, nothing is claimed: ppo differs from tanner by +0.100" in text
     analysis = analysis_of(matrices, conditions=conditions)
     assert headline(analysis.overall) == "highest, without intervals: ppo"
 

@@ -95,7 +95,7 @@ def test_a_controller_within_the_bounds_is_left_alone():
         action, state = controller.predict(observation, state, np.full(8, k == 0))
         observation, *_, info = env.step(action)
         assert not info["intervened"].any()
-    assert env.scaling.interventions == 0
+    assert env.filtering.interventions == 0
 
 
 def test_braking_is_never_reduced_below_the_bound():
@@ -118,7 +118,7 @@ def test_interventions_are_counted_in_size_and_number():
     assert info["intervention_m_s2"] == pytest.approx(3.0 - L1.acceleration_bound)
     *_, info = env.step(np.zeros(3))
     assert info["intervened"] is False
-    assert env.scaling.intervention_rate == pytest.approx(0.5)
+    assert env.filtering.intervention_rate == pytest.approx(0.5)
 
 
 def test_single_and_batched_wrapper_agree_bit_for_bit():
@@ -167,7 +167,7 @@ def test_wrapped_environment_passes_gymnasiums_check():
 def test_certificates_that_do_not_fit_are_refused():
     with pytest.raises(CertificateError, match="task"):
         NuMaxActionScaling(gymnasium.make(ENV_ID, control_mode="force"), L1)
-    with pytest.raises(CertificateError, match="coordinate_count"):
+    with pytest.raises(CertificateError, match="segment_count"):
         NuMaxActionScaling(gymnasium.make(ENV_ID, beam=BeamParams(segment_count=2)), L1)
     with pytest.raises(CertificateError, match="sigma"):
         NuMaxActionScaling(gymnasium.make(ENV_ID, sigma_rad=0.3), L1)
@@ -204,7 +204,7 @@ def test_the_ignored_step_of_next_step_mode_is_not_counted():
     env.reset(seed=0)
     for action in (0.2, 0.2, np.nan, 0.2):  # the third is ignored
         env.step(np.full((2, 3), action))
-    assert env.scaling.steps == 6
+    assert env.filtering.steps == 6
     env.step(np.full((2, 3), 0.2))  # ends the second episodes
     env.reset(seed=1)
     with pytest.raises(ActionError):

@@ -1,4 +1,4 @@
-"""Swing against swing rate, and the set that a certificate keeps them in."""
+"""Swing against swing rate, and the set that a safety filter keeps them in."""
 
 from __future__ import annotations
 
@@ -10,14 +10,25 @@ from numpy.typing import NDArray
 
 from defmanip_gym.evaluation.plots.panel import BAND, BOUND, FAINT, panel, title
 from defmanip_gym.evaluation.plots.swing import sigma_rad
+from defmanip_gym.evaluation.protection import Protection
+from defmanip_gym.evaluation.suites import NOMINAL
 from defmanip_gym.evaluation.traces import Trace
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.certificates.phase_plane import one_hinge_reachable_set
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 Edge = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 _CUT = 1.5
+
+
+def kept_set(protection: Protection) -> Edge | None:
+    """Return the upper edge of what a filter keeps the nominal beam in; None if not known."""
+    if protection.certificate is not None:
+        return reachable_set(protection.certificate)
+    made = protection.filter_for(NOMINAL)
+    return made.edge() if isinstance(made, StorageFilter) else None
 
 
 def reachable_set(certificate: Certificate) -> Edge | None:
@@ -47,9 +58,9 @@ def plot_phase(
     Args:
         traces: of one contestant.
         colour: its colour.
-        edge: of a certificate's reachable set.
-        is_enforced: whether that certificate is enforced on this contestant.
-        uncovered: scenarios whose plant the certificate does not cover; drawn dotted.
+        edge: of the set that a filter keeps.
+        is_enforced: whether that filter is around this contestant.
+        uncovered: scenarios whose plant the filter does not cover; drawn dotted.
     """
     figure, axes = panel(2.35)
     sigma = sigma_rad(traces[0])

@@ -158,14 +158,14 @@ COLUMNS = (
     Column(
         heading="Interventions",
         unit="% of steps",
-        legend="share of steps in which the certificate changed the command, and the mean change "
-        "over all steps; – without certificate",
+        legend="share of steps in which the filter changed the command, and the mean change "
+        "over all steps; – without filter",
         cell=_interventions,
     ),
     Column(
         heading="Applies",
         unit="% of episodes",
-        legend="share of episodes that the certificate covers: their beam and start, and neither "
+        legend="share of episodes that the filter covers: their beam and start, and neither "
         "late actuators, sensor noise nor forces beyond the paper's; – without one",
         cell=lambda row: share_cell(row.summary.certificate_applies),
     ),
@@ -179,7 +179,7 @@ COLUMNS = (
     Column(
         heading="Decision",
         unit="ms",
-        legend="median wall time of one decision on one observation, certificate included, on the "
+        legend="median wall time of one decision on one observation, filter included, on the "
         "machine that made this report",
         cell=_decision,
     ),

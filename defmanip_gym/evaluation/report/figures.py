@@ -11,21 +11,22 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from defmanip_gym.evaluation.analysis import SuiteAnalysis
-from defmanip_gym.evaluation.contestants import CERTIFICATE_OPTION, Contestant
+from defmanip_gym.evaluation.contestant import Contestant
+from defmanip_gym.evaluation.contestants import FILTER_OPTION
 from defmanip_gym.evaluation.plots.condition_scores import (
     plot_score_by_condition,
     plot_success_by_condition,
 )
 from defmanip_gym.evaluation.plots.forest import plot_forest
 from defmanip_gym.evaluation.plots.panel import as_png
-from defmanip_gym.evaluation.plots.phase import Edge, plot_phase, reachable_set
+from defmanip_gym.evaluation.plots.phase import Edge, kept_set, plot_phase
 from defmanip_gym.evaluation.plots.score_profiles import plot_profiles
 from defmanip_gym.evaluation.plots.swing import plot_swing
+from defmanip_gym.evaluation.protection import Protection, StorageProtection
 from defmanip_gym.evaluation.statistics.profiles import Profile, performance_profile
 from defmanip_gym.evaluation.statistics.resampling import Sample
 from defmanip_gym.evaluation.traces import Trace
 from defmanip_gym.files import write_atomically
-from defmanip_gym.theory.certificates import Certificate
 
 _THRESHOLDS = 81
 
@@ -58,18 +59,18 @@ class FigureGroup:
 
 
 class ReachableSets:
-    """Edges of the certificates' reachable sets, computed once each."""
+    """Edges of what filters keep the swing in, computed once each."""
 
     def __init__(self) -> None:
-        self._edges: dict[Certificate, Edge | None] = {}
+        self._edges: dict[Protection, Edge | None] = {}
 
-    def of(self, certificate: Certificate | None) -> Edge | None:
-        """Return the edge, None without certificate or where it is not known."""
-        if certificate is None:
+    def of(self, protection: Protection | None) -> Edge | None:
+        """Return the edge, None without filter or where it is not known."""
+        if protection is None:
             return None
-        if certificate not in self._edges:
-            self._edges[certificate] = reachable_set(certificate)
-        return self._edges[certificate]
+        if protection not in self._edges:
+            self._edges[protection] = kept_set(protection)
+        return self._edges[protection]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +84,7 @@ class SuiteFigures:
         contestants: who took part.
         chosen: names of those shown at once.
         traces: of the suite.
-        uncovered: (contestant, member, scenario) of episodes that no certificate covers.
+        uncovered: (contestant, member, scenario) of episodes that the filter does not cover.
         reachable: shared by the suites.
     """
 
@@ -167,28 +168,21 @@ class SuiteFigures:
         }
         return self._ordered(
             "Phase plane",
-            "Swing and swing rate of the same episodes. Filled: what the enforced certificate lets "
-            "its beam reach from the starts that it allows; grey outline: the same of "
-            f"{CERTIFICATE_OPTION} where none is enforced. Dotted: episodes that the certificate "
-            "does not cover, the beam or the start being another.",
+            "Swing and swing rate of the same episodes. Filled: what the filter keeps the "
+            "nominal beam in; grey outline: the same of "
+            f"{FILTER_OPTION} where there is none. Dotted: episodes that the filter does not "
+            "cover.",
             panels,
         )
 
     def _phase(self, name: str, traces: Sequence[Trace]) -> Figure:
-        certificate = self.contestants[name].certificate
-        shown = certificate or next(
-            (
-                c.certificate
-                for c in self.contestants.values()
-                if c.certificate is not None and c.certificate.method == CERTIFICATE_OPTION
-            ),
-            None,
-        )
+        protection = self.contestants[name].protection
+        shown = protection or StorageProtection(FILTER_OPTION)
         return plot_phase(
             traces,
             self.colours[name],
             edge=self.reachable.of(shown),
-            is_enforced=certificate is not None,
+            is_enforced=protection is not None,
             uncovered={t.scenario for t in traces if self._key(t) in self.uncovered},
         )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from defmanip_gym.evaluation.contestants import Contestant
+from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.report.animation import Animation
 from defmanip_gym.evaluation.report.columns import COLUMNS, Row
 from defmanip_gym.evaluation.report.figures import FigureGroup

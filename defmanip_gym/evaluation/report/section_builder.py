@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from defmanip_gym.evaluation.analysis import SuiteAnalysis, analyse
-from defmanip_gym.evaluation.contestants import Contestant
+from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report.animation import Animation, animation
 from defmanip_gym.evaluation.report.columns import Row
@@ -50,7 +50,7 @@ class SectionBuilder:
             RecordError: an episode is missing or there twice, or a trace is damaged.
         """
         by_name = {contestant.name: contestant for contestant in self.contestants}
-        certified = [c.name for c in self.contestants if c.certificate is not None]
+        certified = [c.name for c in self.contestants if c.protection is not None]
         analysis = analyse(records, suite.name, order=list(by_name), certified=certified)
         traces = self._traces(suite)
         return Section(

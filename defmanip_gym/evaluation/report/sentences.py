@@ -29,11 +29,11 @@ def suite_claims(analysis: SuiteAnalysis) -> tuple[Claim, ...]:
     summaries = {summary.contestant: summary for summary in analysis.summaries}
     claims = [Claim(standing_sentence("Among all contestants", analysis.overall, summaries))]
     if analysis.certified is not None:
-        who = "Among those inside a certificate"
+        who = "Among those inside a safety filter"
         claims.append(Claim(standing_sentence(who, analysis.certified, summaries)))
     duels = {
-        "Without a certificate": analysis.free_duel,
-        "Inside a certificate": analysis.certified_duel,
+        "Without a filter": analysis.free_duel,
+        "Inside a filter": analysis.certified_duel,
     }
     for who, duel in duels.items():
         if duel is not None:
@@ -43,16 +43,16 @@ def suite_claims(analysis: SuiteAnalysis) -> tuple[Claim, ...]:
 
 
 def certificate_claim(records: Sequence[EpisodeRecord]) -> Claim | None:
-    """Return whether certificates kept their word where they apply; None if they apply nowhere."""
+    """Return whether filters kept their word where they apply; None if they apply nowhere."""
     covered = sum(record.certificate_applies is True for record in records)
     if not covered:
         return None
     broken = broken_certificates(records)
     if not broken:
-        return Claim(f"Certificates held: σ was kept in all {covered} episodes that one covers.")
+        return Claim(f"Filters held: σ was kept in all {covered} episodes that one covers.")
     names = ", ".join(sorted({record.contestant for record in broken}))
     return Claim(
-        f"CERTIFICATES BROKEN: σ was exceeded in {len(broken)} of {covered} episodes that one "
+        f"FILTERS BROKEN: σ was exceeded in {len(broken)} of {covered} episodes that one "
         f"covers ({names})."
     )
 

@@ -31,10 +31,10 @@ class FilterConditions:
         delay_periods: control periods until a command takes effect.
     """
 
-    forward_error_m_s2: float = 0.1
-    lateral_error_m_s2: float = 0.1
-    vertical_error_m_s2: float = 0.12
-    storage_error: float = 0.001
+    forward_error_m_s2: float = 0.17
+    lateral_error_m_s2: float = 0.17
+    vertical_error_m_s2: float = 0.15
+    storage_error: float = 0.0015
     swing_noise_rad: float = 0.0
     delay_periods: int = 0
 

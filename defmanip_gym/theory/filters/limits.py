@@ -17,7 +17,7 @@ from defmanip_gym.theory.dynamics.robot_model import ArmLengths
 # of the drive force that is counted on
 _DRIVE_SHARE = 0.9
 # of the largest acceleration, for stopping before the arm's limits
-_BRAKING_SHARE = 0.6
+BRAKING_SHARE = 0.6
 
 
 class RobotLimits(NamedTuple):
@@ -59,27 +59,37 @@ def forward_range(limits: RobotLimits, reach: float, yaw_rate: float) -> tuple[f
 
 
 @compilable
+def height_range(limits: RobotLimits, reach: float, above: float) -> tuple[float, float]:
+    """Return the lowest and highest grasp above the shoulder, m, at a reach.
+
+    The folded arm leaves a gap around the shoulder's height; ``above`` tells the side.
+    """
+    upper, fore = limits.arm.upper_arm_m, limits.arm.forearm_m
+    both, bent = upper**2 + fore**2, 2.0 * upper * fore * cos(limits.least_bend_rad)
+    highest = sqrt(max(both + bent - reach**2, 0.0))
+    gap = sqrt(max(both - bent - reach**2, 0.0))
+    lowest = -highest
+    if gap > 0.0 and above > 0.0:
+        lowest = gap
+    elif gap > 0.0:
+        highest = -gap
+    return max(lowest, limits.lowest_m - limits.arm.shoulder_height_m), highest
+
+
+@compilable
 def upward_range(
     limits: RobotLimits, reach: float, height: float, upward_m_s: float
 ) -> tuple[float, float]:
     """Return the vertical accelerations after which the grasp can still stop within the arm."""
     largest, period_s = limits.max_acceleration_m_s2, limits.period_s
-    upper, fore = limits.arm.upper_arm_m, limits.arm.forearm_m
-    both, product = upper**2 + fore**2, 2.0 * upper * fore
-    farthest = both + product * cos(limits.least_bend_rad) - reach**2
-    nearest = both - product * cos(limits.least_bend_rad) - reach**2
     above = height - limits.arm.shoulder_height_m
-    highest, lowest = sqrt(max(farthest, 0.0)), -sqrt(max(farthest, 0.0))
-    if nearest > 0.0:  # the folded arm leaves a gap around the shoulder's height
-        if above > 0.0:
-            lowest = sqrt(nearest)
-        else:
-            highest = -sqrt(nearest)
-    lowest = max(lowest, limits.lowest_m - limits.arm.shoulder_height_m)
-    braking = 2.0 * _BRAKING_SHARE * largest
+    lowest, highest = height_range(limits, reach, above)
     later = above + period_s * upward_m_s
-    rising = sqrt(braking * max(highest - later, 0.0))
-    sinking = sqrt(braking * max(later - lowest, 0.0))
+    twice = 2.0 * BRAKING_SHARE * largest
+    rising, sinking = (
+        sqrt(twice * max(highest - later, 0.0)),
+        sqrt(twice * max(later - lowest, 0.0)),
+    )
     low, high = (-sinking - upward_m_s) / period_s, (rising - upward_m_s) / period_s
     return min(max(low, -largest), largest), max(min(high, largest), -largest)
 

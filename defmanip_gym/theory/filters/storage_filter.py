@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
-import scipy.linalg
 
 from defmanip_gym.compiled import machine_code, without_garbage_collection
 from defmanip_gym.errors import CertificateError
@@ -29,7 +29,8 @@ from defmanip_gym.theory.filters.batches import (
     store_all,
 )
 from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
-from defmanip_gym.theory.filters.limits import RobotLimits
+from defmanip_gym.theory.filters.limits import BRAKING_SHARE, RobotLimits, height_range
+from defmanip_gym.theory.filters.reserves import estimate_drift_rad, reserved_shares
 from defmanip_gym.theory.filters.safety_filter import (
     BoolArray,
     FilterDecision,
@@ -40,11 +41,11 @@ from defmanip_gym.theory.filters.safety_filter import (
 from defmanip_gym.theory.filters.sensed import Sensed, gained_acceleration
 from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.filters.swing_estimate import SwingEstimate
-from defmanip_gym.theory.payload.object_model import HangingBeam
 from defmanip_gym.validation import plain, require_params
 
 _LEAST_BEND_RAD = 0.6
 _LEAST_HEIGHT_SHARE = 1.5  # of the lowest grasp that ends no episode
+_EDGE_POINTS = 1001
 _LEAST_LEVEL = 0.05  # of V_σ; below, errors leave nothing worth filtering for
 
 
@@ -102,7 +103,9 @@ class StorageFilter(SafetyFilter):
         self._layout = ObservationLayout(beam.segment_count)
         self._model = StorageModel.of(self.intervals.corners(beam), self.sigma_rad)
         self.pass_j = float(self._model.passes[0])
-        shares = 1.0 - self._reserves()
+        shares = 1.0 - reserved_shares(
+            self._model, beam, sigma_rad=self.sigma_rad, conditions=conditions, task=task
+        )
         self.level_share = float(shares.min())
         if not self.level_share >= _LEAST_LEVEL:
             raise CertificateError(
@@ -114,13 +117,7 @@ class StorageFilter(SafetyFilter):
         self.setup = StorageLevels(
             model=self._model,
             levels=shares * self._model.passes,
-            errors=np.array(
-                (
-                    conditions.forward_error_m_s2,
-                    conditions.lateral_error_m_s2,
-                    conditions.vertical_error_m_s2,
-                )
-            ),
+            errors=np.array(self.errors_m_s2),
             residual=float(conditions.storage_error),
             limits=self._limits(),
         )
@@ -158,6 +155,28 @@ class StorageFilter(SafetyFilter):
         names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
         return {"name": self.name} | {name: plain(getattr(self, name)) for name in names}
 
+    @property
+    def errors_m_s2(self) -> tuple[float, float, float]:
+        """Errors of acceleration that it provides for: forward, to the side, upwards."""
+        conditions = self.conditions
+        return (
+            conditions.forward_error_m_s2,
+            conditions.lateral_error_m_s2,
+            conditions.vertical_error_m_s2,
+        )
+
+    def with_conditions(self, **changes: Any) -> Self:
+        """Return the same filter with other conditions, fields of ``FilterConditions``."""
+        return self._with(conditions=replace(self.conditions, **changes))
+
+    def for_beam(self, beam: BeamParams) -> Self:
+        """Return the same filter for another beam, known exactly."""
+        return self._with(beam=beam, intervals=PayloadIntervals())
+
+    def _with(self, **changes: Any) -> Self:
+        names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
+        return type(self)(**{name: getattr(self, name) for name in names} | changes)
+
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
         return self.intervals.cover(self.beam, beam)
@@ -168,7 +187,7 @@ class StorageFilter(SafetyFilter):
             count,
             self.segment_count,
             noise_rad=self.conditions.swing_noise_rad,
-            drift_rad=self._drift_rad,
+            drift_rad=estimate_drift_rad(self.beam, self.pass_j, self.task.control_period_s),
             period_s=self.task.control_period_s,
         )
         return StorageMemory(count, self.conditions.delay_periods, estimate)
@@ -242,6 +261,40 @@ class StorageFilter(SafetyFilter):
         self._store(self.setup, sensed, self._room, shares)
         return shares
 
+    def heights(self, reach_m: Array) -> tuple[Array, Array]:
+        """Return the lowest and the highest grasp, (n,) m, that the filter lets the arm go to."""
+        shoulder = self.robot.shoulder_height_m
+        goal_pitch = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
+        above = float(ArmKinematics(self.robot).reach_and_height(goal_pitch)[1]) - shoulder
+        ends = np.array([height_range(self.setup.limits, reach, above) for reach in reach_m])
+        return ends[:, 0] + shoulder, ends[:, 1] + shoulder
+
+    @property
+    def braking_m_s2(self) -> float:
+        """The vertical acceleration that it counts on for stopping within the arm's range."""
+        return BRAKING_SHARE * self.task.max_acceleration_m_s2
+
+    def edge(self) -> tuple[Array, Array] | None:
+        """Return the upper edge (φ, φ̇) of the set that it keeps, one hinge only, else None."""
+        if self.segment_count != 1:
+            return None
+        level, moment = float(self.setup.levels[0]), float(self._model.moments[0, 0])
+        stiffness = float(self._model.stiffness[0, 0, 0])
+        swing = np.linspace(-self.sigma_rad, self.sigma_rad, _EDGE_POINTS)
+        potential = GRAVITY_M_S2 * moment * (1 - np.cos(swing)) + 0.5 * stiffness * swing**2
+        inertia = float(self._model.inertia[0, 0] + self._model.coupling[0, 0, 0])
+        kept = potential <= level
+        return swing[kept], np.sqrt(2 * (level - potential[kept]) / inertia)
+
+    def shares_of(self, swing: Array, swing_rate: Array, yaw_rate: Array) -> Array:
+        """Return B over its level, (n,), of swings and rates (n, N) at yaw rates (n,)."""
+        sensed = Sensed.empty(len(swing), self.segment_count)
+        sensed.swing[:], sensed.swing_rate[:] = swing, swing_rate
+        sensed.base_velocity[:, 1] = yaw_rate
+        shares = np.empty(len(swing))
+        self._store(self.setup, sensed, self._room, shares)
+        return shares
+
     def storage_errors(self, before: Array, after: Array) -> Array:
         """Return how much more B a period brought than its mean acceleration explains, (n,).
 
@@ -278,35 +331,3 @@ class StorageFilter(SafetyFilter):
             least_bend_rad=_LEAST_BEND_RAD,
             lowest_m=float(_LEAST_HEIGHT_SHARE * task.smallest_grasp_height_m),
         )
-
-    @property
-    def _drift_rad(self) -> float:
-        """The trapezoidal rule's error on φ̇ over a period."""
-        period_s = self.task.control_period_s
-        model = HangingBeam(self.beam)
-        stiffness = model.k_o22 + GRAVITY_M_S2 * np.diag(model.chain.constants.first_moments)
-        inertia = model.chain.mass_matrix(np.full(self.segment_count, -np.pi / 2))[2:, 2:]
-        squares, _ = scipy.linalg.eigh(stiffness, inertia)
-        lightest = scipy.linalg.eigvalsh(inertia)[0]
-        largest_rate = math.sqrt(2 * self.pass_j / lightest)
-        return float(min(period_s**3 / 12 * squares[-1], period_s) * largest_rate)
-
-    def _reserves(self) -> Array:
-        """Return the shares of V_σ that are kept back, (C,); docs/derivations.md, section 14."""
-        model, conditions, task = self._model, self.conditions, self.task
-        period_s = task.control_period_s
-        total = model.moments.sum(axis=1)
-        widest = 2 * math.sin(self.sigma_rad) * total
-        highest = (1 - math.cos(self.sigma_rad)) * total
-        forward, upward = conditions.forward_error_m_s2, conditions.vertical_error_m_s2
-        # while the speed limit forbids to damp
-        at_the_limit = forward * widest + upward * highest
-        # |s| ≤ √(2 m V); all errors of the periods under way
-        momentum = np.sqrt(2 * model.mass * model.passes)
-        per_period = period_s * momentum * math.hypot(forward, upward)
-        delayed = conditions.delay_periods * (per_period + conditions.storage_error * model.passes)
-        # between samples V is at most this much above the larger of its ends
-        pull = GRAVITY_M_S2 * math.sin(self.sigma_rad) + task.max_acceleration_m_s2
-        between = period_s**2 / 8 * model.mass * pull * task.max_acceleration_m_s2
-        reserves: Array = (at_the_limit + delayed + between) / model.passes
-        return reserves

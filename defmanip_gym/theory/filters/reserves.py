@@ -1,0 +1,84 @@
+"""What of V_σ sampling, errors, noise and delay cost: docs/derivations.md, section 14."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import scipy.linalg
+
+from defmanip_gym.params import GRAVITY_M_S2, BeamParams
+from defmanip_gym.task_params import TaskParams
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.filters.conditions import FilterConditions
+from defmanip_gym.theory.filters.storage import StorageModel
+from defmanip_gym.theory.payload.object_model import HangingBeam
+
+_PERIODS_AT_THE_LIMIT = 4.0
+
+
+def hanging_modes(beam: BeamParams) -> tuple[Array, Array]:
+    """Return natural frequencies, (N,) rad/s, ascending, and shapes, (N, N), about hanging."""
+    model = HangingBeam(beam)
+    stiffness = model.k_o22 + GRAVITY_M_S2 * np.diag(model.chain.constants.first_moments)
+    squares, shapes = scipy.linalg.eigh(stiffness, _hanging_inertia(beam))
+    return np.sqrt(squares), shapes
+
+
+def estimate_drift_rad(beam: BeamParams, pass_j: float, period_s: float) -> float:
+    """Return the trapezoidal rule's largest error on φ̇ over a period, within V ≤ V_σ."""
+    lightest = float(scipy.linalg.eigvalsh(_hanging_inertia(beam))[0])
+    fastest = float(hanging_modes(beam)[0][-1])
+    return min(period_s**3 / 12 * fastest**2, period_s) * math.sqrt(2 * pass_j / lightest)
+
+
+def reserved_shares(
+    model: StorageModel,
+    beam: BeamParams,
+    *,
+    sigma_rad: float,
+    conditions: FilterConditions,
+    task: TaskParams,
+) -> Array:
+    """Return the shares of V_σ that are kept back, (C,).
+
+    Args:
+        model: of the beams that may be carried.
+        beam: the believed one.
+        sigma_rad: σ.
+        conditions: errors, noise and delay.
+        task: limits and control period.
+    """
+    period_s, passes = task.control_period_s, model.passes
+    yielding = _yielding_mass(model)
+    # |s_f| and |s_u| at their largest within V ≤ V_σ
+    forward = np.sqrt(2 * yielding * passes)
+    upward = 0.5 * math.tan(sigma_rad) * forward
+    errors = period_s * (
+        forward * conditions.forward_error_m_s2 + upward * conditions.vertical_error_m_s2
+    )
+    # while the speed limit forbids to damp: errors are changes of what came on top before, so in
+    # a half swing their work is that of a few periods
+    at_the_limit = _PERIODS_AT_THE_LIMIT * errors
+    ripple = conditions.storage_error * passes / (hanging_modes(beam)[0][0] * period_s)
+    delayed = conditions.delay_periods * (errors + conditions.storage_error * passes)
+    # between samples V is at most this much above the larger of its ends
+    largest = task.max_acceleration_m_s2
+    pull = GRAVITY_M_S2 * math.sin(sigma_rad) + largest
+    between = period_s**2 / 8 * yielding * pull * largest
+    shares: Array = (at_the_limit + ripple + delayed + between) / passes
+    return shares
+
+
+def _hanging_inertia(beam: BeamParams) -> Array:
+    """Return m_o22 hanging, (N, N) kg·m²."""
+    chain = HangingBeam(beam).chain
+    return chain.mass_matrix(np.full(beam.segment_count, -np.pi / 2))[2:, 2:]
+
+
+def _yielding_mass(model: StorageModel) -> Array:
+    """Return m_o12 m_o22⁻¹ m_o12ᵀ hanging, forward, (C,) kg: |s_f|² is at most 2 V times it."""
+    own = np.eye(model.moments.shape[1]) * model.inertia[:, None, :]
+    yields = np.linalg.solve(model.coupling + own, model.moments[..., None])[..., 0]
+    mass: Array = (model.moments * yields).sum(axis=1)
+    return mass

@@ -1,0 +1,86 @@
+"""A filter with room for the errors of a robot: the environment's own, not a constant."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import CertificateError
+from defmanip_gym.params import BeamParams
+from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.validation import require_instance
+from defmanip_gym.wrappers.filter_errors import filter_errors
+
+_ROUNDS = 4
+_SPARE = 1.05  # another level makes other errors
+
+
+def filter_for(
+    config: TransportConfig,
+    *,
+    kind: type[StorageFilter] = StorageFilter,
+    beam: BeamParams | None = None,
+    intervals: PayloadIntervals | None = None,
+    delay_periods: int = 0,
+) -> StorageFilter:
+    """Return a filter for an environment, with as much room for errors as its robot makes.
+
+    Args:
+        config: ``env.unwrapped.config``, in task mode.
+        kind: of the family.
+        beam: that the filter believes; the environment's own beam by default.
+        intervals: around it; by default those that ``config.beam_ranges`` draw from.
+        delay_periods: control periods until an action takes effect, as ``ActionDelay`` has them.
+
+    Raises:
+        CertificateError: errors, noise and delay leave nothing of V_σ.
+    """
+    require_instance("config", config, TransportConfig)
+    beam = config.beam if beam is None else beam
+    conditions = FilterConditions(
+        swing_noise_rad=config.disturbance.swing_sensor_noise_rad, delay_periods=delay_periods
+    )
+    made = kind(
+        beam,
+        sigma_rad=config.sigma_rad,
+        robot=config.robot,
+        task=config.task,
+        conditions=conditions,
+        intervals=_drawn_around(config, beam) if intervals is None else intervals,
+    )
+    for _ in range(_ROUNDS):
+        found, given = filter_errors(config, made), made.conditions
+        forward, lateral, vertical = found.acceleration_m_s2
+        needed = replace(
+            given,
+            forward_error_m_s2=max(given.forward_error_m_s2, _SPARE * forward),
+            lateral_error_m_s2=max(given.lateral_error_m_s2, _SPARE * lateral),
+            vertical_error_m_s2=max(given.vertical_error_m_s2, _SPARE * vertical),
+            storage_error=max(given.storage_error, _SPARE * found.storage),
+        )
+        is_enough = (
+            max(forward - given.forward_error_m_s2, lateral - given.lateral_error_m_s2) <= 0
+            and vertical <= given.vertical_error_m_s2
+            and found.storage <= given.storage_error
+        )
+        if is_enough:
+            return made
+        made = made.with_conditions(**vars(needed))
+    raise CertificateError(
+        "errors of the environment",
+        found,
+        "errors that do not grow with the room that is made for them",
+        "Use a shorter control period, a smaller max_acceleration_m_s2 or a better nominal beam.",
+    )
+
+
+def _drawn_around(config: TransportConfig, beam: BeamParams) -> PayloadIntervals:
+    """Return the factors on ``beam`` of what the environment draws and carries."""
+    carried = config.beam_ranges.extremes(config.beam)
+
+    def factors(name: str) -> tuple[float, float]:
+        shares = [getattr(each, name) / getattr(beam, name) for each in (beam, *carried)]
+        return min(shares), max(shares)
+
+    return PayloadIntervals(mass=factors("mass_kg"), length=factors("length_m"))
