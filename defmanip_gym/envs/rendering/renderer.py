@@ -10,14 +10,12 @@ from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering.graphics import GRAPHICS
+from defmanip_gym.envs.rendering.modes import IMAGE_MODES
 from defmanip_gym.envs.rendering.opengl import REMEDY, has_display
 from defmanip_gym.envs.rendering.stage import Image, Stage
 from defmanip_gym.envs.rendering.view_params import MOST_PIXELS, ViewParams
 from defmanip_gym.errors import RenderingError
 from defmanip_gym.validation import require_choice, require_whole
-
-IMAGE_MODES = ("rgb_array", "depth_array")
-RENDER_MODES = ("human", *IMAGE_MODES)
 
 
 class TransportRenderer:
