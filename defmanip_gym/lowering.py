@@ -6,9 +6,11 @@ Numba's general way to an element takes fifty, which LLVM then removes.
 from __future__ import annotations
 
 import operator
+from collections import defaultdict
 from typing import Any
 
 from numba.core import cgutils, ir, types
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs
 from numba.core.compiler_machinery import register_pass
 from numba.core.ir_utils import find_const, get_definition, guard
 from numba.core.lowering import Lower
@@ -19,6 +21,28 @@ _INSTRUCTIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul
 
 
 class _KernelLower(Lower):
+    def _find_singly_assigned_variable(self) -> None:
+        """Let variables be values where every use has their one assignment behind it.
+
+        Numba does so within one block; others become memory, which LLVM then removes.
+        """
+        dominators = compute_cfg_from_blocks(self.blocks).dominators()
+        assigned, used = defaultdict(list), defaultdict(set)
+        for place, block in self.blocks.items():
+            for assignment in block.find_insts(ir.Assign):
+                assigned[assignment.target.name].append(place)
+        # uses in the block of the assignment and after it are not among these
+        for place, names in compute_use_defs(self.blocks).usemap.items():
+            for name in names:
+                used[name].add(place)
+        self._singly_assigned_vars = {
+            name
+            for name, (first, *others) in assigned.items()
+            if not others
+            and all(first < place and first in dominators[place] for place in used[name])
+        }
+        self._blk_local_varmap = dict[str, Any]()
+
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         """Return an element; Numba makes views."""
         pointer = self._element(value, index)
@@ -64,7 +88,7 @@ class _KernelLower(Lower):
             return None
         build, context = self.builder, self.context
         model, value = context.data_model_manager[array], self.loadvar(array_var.name)
-        shape, strides = model.get(build, value, "shape"), model.get(build, value, "strides")
+        shape = model.get(build, value, "shape")
         given, constants = self.loadvar(index_var.name), self._constants(index_var, len(kinds))
         offset = context.get_constant(types.intp, 0)
         for axis, (kind, constant) in enumerate(zip(kinds, constants, strict=True)):
@@ -79,6 +103,7 @@ class _KernelLower(Lower):
             if array.layout == "C":
                 offset = build.add(build.mul(offset, length), place) if axis else place
             else:
+                strides = model.get(build, value, "strides")
                 step = build.mul(place, build.extract_value(strides, axis))
                 offset = build.add(offset, step)
         data = model.get(build, value, "data")

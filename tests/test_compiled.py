@@ -79,6 +79,26 @@ def test_machine_code_of_another_signature_is_not_taken():
     cache.flush()
 
 
+def test_variables_hold_over_branches_and_turns_of_loops():
+    @compiled
+    def wandered(values):
+        largest = shift = 0.0
+        first = values[0]
+        for k in range(len(values)):
+            value = values[k]
+            if value > largest:
+                step = value - largest
+                largest = value
+            for _ in range(2):
+                shift += value - first
+        return 1000 * value + 100 * step + 10 * shift + largest
+
+    values = np.array((3.0, 7.0, 5.0))
+    assert wandered(values) == wandered.py_func(values) == 5407 + 10 * 12
+    for path in Path(wandered._cache._cache_path).glob("*wandered*"):
+        path.unlink()
+
+
 def run(script, **environment):
     return subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
