@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
-from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering.graphics import GRAPHICS
@@ -16,6 +15,9 @@ from defmanip_gym.envs.rendering.stage import Image, Stage
 from defmanip_gym.envs.rendering.view_params import MOST_PIXELS, ViewParams
 from defmanip_gym.errors import RenderingError
 from defmanip_gym.validation import require_choice, require_whole
+
+if TYPE_CHECKING:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 
 class TransportRenderer:
@@ -130,6 +132,8 @@ def _drawn(draw: Callable[[], tuple[Image, ...]]) -> tuple[Image, ...]:
 
 
 def _window(stage: Stage, view: ViewParams) -> MujocoRenderer:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer  # which only windows need
+
     eye = view.camera_of(stage.model)
     settings = ("type", "fixedcamid", "trackbodyid", "azimuth", "elevation", "distance", "lookat")
     config = {name: getattr(eye, name) for name in settings}
