@@ -1,4 +1,4 @@
-"""Typed Numba code into LLVM's: numbers and elements of arrays by few instructions.
+"""Typed Numba code into LLVM's: variables, loops and elements of arrays by few instructions.
 
 Numba's general way to an element takes fifty, which LLVM then removes.
 """
@@ -42,6 +42,26 @@ class _KernelLower(Lower):
             and all(first < place and first in dominators[place] for place in used[name])
         }
         self._blk_local_varmap = dict[str, Any]()
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        """Return the value of an expression; counting by ones needs no division and no error."""
+        if expr.op != "getiter" or resty != types.range_iter64_type or not self._is_by_ones(expr):
+            return super().lower_expr(resty, expr)
+        build, limits = self.builder, self.loadvar(expr.value.name)
+        first, stop, step = (build.extract_value(limits, place) for place in range(3))
+        loop = cgutils.create_struct_proxy(resty)(self.context, build)
+        loop.iter, loop.stop, loop.step = cgutils.alloca_once_value(build, first), stop, step
+        loop.count = cgutils.alloca_once_value(build, build.sub(stop, first))
+        return loop._getvalue()
+
+    def _is_by_ones(self, expr: Any) -> bool:
+        call = guard(get_definition, self.func_ir, expr.value)
+        return (
+            isinstance(call, ir.Expr)
+            and call.op == "call"
+            and getattr(self.typeof(call.func.name), "typing_key", None) is range
+            and len(call.args) < 3  # start and stop
+        )
 
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         """Return an element; Numba makes views."""

@@ -99,6 +99,25 @@ def test_variables_hold_over_branches_and_turns_of_loops():
         path.unlink()
 
 
+@pytest.mark.parametrize("limits", [(3, 3, 0), (7, 2, -2), (2, 7, 2), (2, 8, 3), (-4, -1, 1)])
+def test_loops_count_as_in_python(limits):
+    @compiled
+    def counted(first, stop, step):
+        total, turns = 0, range(first, stop)
+        for k in turns:
+            total += 100 * k + 1
+        for k in range(stop):
+            total += 10_000 * k + 1
+        if step != 0:
+            for k in range(first, stop, step):
+                total += 1_000_000 * k + 1
+        return total
+
+    assert counted(*limits) == counted.py_func(*limits)
+    for path in Path(counted._cache._cache_path).glob("*counted*"):
+        path.unlink()
+
+
 def run(script, **environment):
     return subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
