@@ -79,45 +79,6 @@ def test_machine_code_of_another_signature_is_not_taken():
     cache.flush()
 
 
-def test_variables_hold_over_branches_and_turns_of_loops():
-    @compiled
-    def wandered(values):
-        largest = shift = 0.0
-        first = values[0]
-        for k in range(len(values)):
-            value = values[k]
-            if value > largest:
-                step = value - largest
-                largest = value
-            for _ in range(2):
-                shift += value - first
-        return 1000 * value + 100 * step + 10 * shift + largest
-
-    values = np.array((3.0, 7.0, 5.0))
-    assert wandered(values) == wandered.py_func(values) == 5407 + 10 * 12
-    for path in Path(wandered._cache._cache_path).glob("*wandered*"):
-        path.unlink()
-
-
-@pytest.mark.parametrize("limits", [(3, 3, 0), (7, 2, -2), (2, 7, 2), (2, 8, 3), (-4, -1, 1)])
-def test_loops_count_as_in_python(limits):
-    @compiled
-    def counted(first, stop, step):
-        total, turns = 0, range(first, stop)
-        for k in turns:
-            total += 100 * k + 1
-        for k in range(stop):
-            total += 10_000 * k + 1
-        if step != 0:
-            for k in range(first, stop, step):
-                total += 1_000_000 * k + 1
-        return total
-
-    assert counted(*limits) == counted.py_func(*limits)
-    for path in Path(counted._cache._cache_path).glob("*counted*"):
-        path.unlink()
-
-
 def run(script, **environment):
     return subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
