@@ -30,6 +30,8 @@ _PASSES_LEFT_OUT = frozenset(
         "inline_closure_likes",
         "inline_inlinables",
         "inline_overloads",
+        "ir_legalization",
+        "ir_processing",
         "literal_unroll",
         "LiteralPropagation",
         "make_function_op_code_to_jit_function",
@@ -106,6 +108,8 @@ class _TypingMemory:
 
     def __init__(self, rules: Any) -> None:
         self._rules, self._signatures = rules, dict[Any, Any]()
+        self.resolve_setitem = functools.cache(rules.resolve_setitem)
+        self.resolve_getattr = functools.cache(rules.resolve_getattr)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._rules, name)

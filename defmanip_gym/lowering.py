@@ -1,4 +1,4 @@
-"""Typed Numba code into LLVM's: numbers and elements of arrays by few instructions.
+"""Typed Numba code into LLVM's: variables, loops and elements of arrays by few instructions.
 
 Numba's general way to an element takes fifty, which LLVM then removes.
 """
@@ -6,9 +6,11 @@ Numba's general way to an element takes fifty, which LLVM then removes.
 from __future__ import annotations
 
 import operator
+from collections import defaultdict
 from typing import Any
 
 from numba.core import cgutils, ir, types
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs
 from numba.core.compiler_machinery import register_pass
 from numba.core.ir_utils import find_const, get_definition, guard
 from numba.core.lowering import Lower
@@ -19,6 +21,48 @@ _INSTRUCTIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul
 
 
 class _KernelLower(Lower):
+    def _find_singly_assigned_variable(self) -> None:
+        """Let variables be values where every use has their one assignment behind it.
+
+        Numba does so within one block; others become memory, which LLVM then removes.
+        """
+        dominators = compute_cfg_from_blocks(self.blocks).dominators()
+        assigned, used = defaultdict(list), defaultdict(set)
+        for place, block in self.blocks.items():
+            for assignment in block.find_insts(ir.Assign):
+                assigned[assignment.target.name].append(place)
+        # uses in the block of the assignment and after it are not among these
+        for place, names in compute_use_defs(self.blocks).usemap.items():
+            for name in names:
+                used[name].add(place)
+        self._singly_assigned_vars = {
+            name
+            for name, (first, *others) in assigned.items()
+            if not others
+            and all(first < place and first in dominators[place] for place in used[name])
+        }
+        self._blk_local_varmap = dict[str, Any]()
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        """Return the value of an expression; counting by ones needs no division and no error."""
+        if expr.op != "getiter" or resty != types.range_iter64_type or not self._is_by_ones(expr):
+            return super().lower_expr(resty, expr)
+        build, limits = self.builder, self.loadvar(expr.value.name)
+        first, stop, step = (build.extract_value(limits, place) for place in range(3))
+        loop = cgutils.create_struct_proxy(resty)(self.context, build)
+        loop.iter, loop.stop, loop.step = cgutils.alloca_once_value(build, first), stop, step
+        loop.count = cgutils.alloca_once_value(build, build.sub(stop, first))
+        return loop._getvalue()
+
+    def _is_by_ones(self, expr: Any) -> bool:
+        call = guard(get_definition, self.func_ir, expr.value)
+        return (
+            isinstance(call, ir.Expr)
+            and call.op == "call"
+            and getattr(self.typeof(call.func.name), "typing_key", None) is range
+            and len(call.args) < 3  # start and stop
+        )
+
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         """Return an element; Numba makes views."""
         pointer = self._element(value, index)
@@ -64,7 +108,7 @@ class _KernelLower(Lower):
             return None
         build, context = self.builder, self.context
         model, value = context.data_model_manager[array], self.loadvar(array_var.name)
-        shape, strides = model.get(build, value, "shape"), model.get(build, value, "strides")
+        shape = model.get(build, value, "shape")
         given, constants = self.loadvar(index_var.name), self._constants(index_var, len(kinds))
         offset = context.get_constant(types.intp, 0)
         for axis, (kind, constant) in enumerate(zip(kinds, constants, strict=True)):
@@ -79,6 +123,7 @@ class _KernelLower(Lower):
             if array.layout == "C":
                 offset = build.add(build.mul(offset, length), place) if axis else place
             else:
+                strides = model.get(build, value, "strides")
                 step = build.mul(place, build.extract_value(strides, axis))
                 offset = build.add(offset, step)
         data = model.get(build, value, "data")

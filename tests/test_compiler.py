@@ -47,6 +47,40 @@ def test_elements_are_those_that_python_names(stride):
         np.testing.assert_array_equal(result, expected)
 
 
+def wander(values):
+    largest = shift = 0.0
+    first = values[0]
+    for k in range(len(values)):
+        value = values[k]
+        if value > largest:
+            step = value - largest
+            largest = value
+        for _ in range(2):
+            shift += value - first
+    return 1000 * value + 100 * step + 10 * shift + largest
+
+
+def test_variables_hold_over_branches_and_turns_of_loops():
+    values = np.array((3.0, 7.0, 5.0))
+    assert kernel(wander)(values) == wander(values)
+
+
+def count(first, stop, step):
+    total, turns = 0, range(first, stop)
+    for k in turns:
+        total += 100 * k + 1
+    for k in range(stop):
+        total += 10_000 * k + 1
+    for k in range(first, stop, step):
+        total += 1_000_000 * k + 1
+    return total
+
+
+@pytest.mark.parametrize("limits", [(3, 3, 1), (7, 2, -2), (2, 7, 2), (2, 8, 3), (-4, -1, 1)])
+def test_loops_count_as_in_python(limits):
+    assert kernel(count)(*limits) == count(*limits)
+
+
 def combine(x, y, n):
     total = x * y - n * x + 2 * y
     total -= x**2 + y**3 - n**2 * x

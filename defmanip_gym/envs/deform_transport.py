@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
-from defmanip_gym.envs.rendering.renderer import RENDER_MODES, TransportRenderer
+from defmanip_gym.envs.rendering.modes import RENDER_MODES, RenderModes
+from defmanip_gym.envs.rendering.renderer import TransportRenderer
 from defmanip_gym.envs.rendering.stage import Image
 from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
@@ -138,7 +139,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     * v0: initial version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": RenderModes(RENDER_MODES), "render_fps": 50}
 
     def __init__(
         self,

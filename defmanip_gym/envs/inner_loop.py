@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -134,9 +135,12 @@ def _clip(actions: Array) -> bool:
     count, size = actions.shape
     for i in range(count):
         for k in range(size):
-            if not np.isfinite(actions[i, k]):
+            if not math.isfinite(actions[i, k]):
                 return False
-            actions[i, k] = min(max(actions[i, k], -1.0), 1.0)
+            if actions[i, k] > 1.0:
+                actions[i, k] = 1.0
+            elif actions[i, k] < -1.0:
+                actions[i, k] = -1.0
     return True
 
 

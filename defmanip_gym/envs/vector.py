@@ -17,7 +17,8 @@ from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
 from defmanip_gym.envs.registration import MAX_EPISODE_STEPS
-from defmanip_gym.envs.rendering.renderer import IMAGE_MODES, TransportRenderer
+from defmanip_gym.envs.rendering.modes import IMAGE_MODES
+from defmanip_gym.envs.rendering.renderer import TransportRenderer
 from defmanip_gym.envs.rendering.stage import Image
 from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.envs.state_tree import fitted

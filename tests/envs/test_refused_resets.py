@@ -2,13 +2,15 @@
 
 import pickle
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 
-from defmanip_gym import get_state
+from defmanip_gym import get_state, set_state
 from defmanip_gym.baselines.residual_action import ResidualAction, ResidualVectorAction
 from defmanip_gym.envs.deform_transport import DeformTransportEnv
+from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import ActionError, StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams
 from defmanip_gym.theory.certificates import certify
@@ -92,3 +94,25 @@ def test_a_first_reset_of_some_starts_none(make_batch):
     with pytest.raises(ResetNeeded):
         env.reset(seed=1, options={"reset_mask": np.array([True, False, True])})
     assert kept(env) == before
+
+
+@pytest.mark.parametrize("arguments", RESETS)
+def test_a_state_brings_back_the_count_of_gymnasiums_time_limit(arguments):
+    env = gymnasium.make(ENV_ID, max_episode_steps=2)
+    env.reset(seed=0)
+    env.step(np.zeros(3))
+    state = get_state(env)
+    with pytest.raises(StartError):
+        env.reset(**arguments)
+    set_state(env, state)
+    assert env.step(np.zeros(3))[3]
+
+
+@pytest.mark.parametrize("arguments", RESETS)
+def test_a_batch_counts_its_steps_on(arguments):
+    env = gymnasium.make_vec(ENV_ID, num_envs=1, max_episode_steps=2)
+    env.reset(seed=0)
+    env.step(np.zeros((1, 3)))
+    with pytest.raises(StartError):
+        env.reset(**arguments)
+    assert env.step(np.zeros((1, 3)))[3].all()

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
-from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering.graphics import GRAPHICS
+from defmanip_gym.envs.rendering.modes import IMAGE_MODES
 from defmanip_gym.envs.rendering.opengl import REMEDY, has_display
 from defmanip_gym.envs.rendering.stage import Image, Stage
 from defmanip_gym.envs.rendering.view_params import MOST_PIXELS, ViewParams
 from defmanip_gym.errors import RenderingError
 from defmanip_gym.validation import require_choice, require_whole
 
-IMAGE_MODES = ("rgb_array", "depth_array")
-RENDER_MODES = ("human", *IMAGE_MODES)
+if TYPE_CHECKING:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
 
 class TransportRenderer:
@@ -132,6 +132,8 @@ def _drawn(draw: Callable[[], tuple[Image, ...]]) -> tuple[Image, ...]:
 
 
 def _window(stage: Stage, view: ViewParams) -> MujocoRenderer:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer  # which only windows need
+
     eye = view.camera_of(stage.model)
     settings = ("type", "fixedcamid", "trackbodyid", "azimuth", "elevation", "distance", "lookat")
     config = {name: getattr(eye, name) for name in settings}
