@@ -73,7 +73,7 @@ class Applicability:
             it does as far as is known by now.
     """
 
-    remembers = ("words", "_is_outside")
+    remembers = ("words", "_is_outside")  # of which the rest follows
 
     def __init__(
         self,
@@ -87,12 +87,13 @@ class Applicability:
         self._action_changers, self._delay_periods = action_changers, delay_periods
         self._terms = _terms(config, safety_filter)
         self.reasons = np.full(count, "", dtype=object)
+        self._applies = np.ones(count, dtype=bool)
         self._is_outside = np.zeros(count, dtype=bool)
 
     @property
     def applies(self) -> BoolArray:
         """Whether the promise covers the episodes as far as is known by now, (n,)."""
-        return self.reasons == ""
+        return self._applies.copy()
 
     @property
     def words(self) -> list[str]:
@@ -102,6 +103,7 @@ class Applicability:
     @words.setter
     def words(self, words: list[str]) -> None:
         self.reasons = np.array(words, dtype=object)
+        self._note()
 
     def begin(self, observation: Array, memory: Any, started: BoolArray) -> None:
         """Judge episodes at their start.
@@ -113,11 +115,15 @@ class Applicability:
         """
         self.reasons[started] = self.configuration_reason
         self._is_outside[started] = False
-        for i in np.flatnonzero(started & self.applies).tolist():
+        self._note()
+        for i in np.flatnonzero(started & self._applies).tolist():
             self.reasons[i] = self._terms.start_reason(observation, i)
-        if (started & self.applies).any():
-            self._is_outside |= started & self.applies & ~self._filter.inside(observation, memory)
+        self._note()
+        if (started & self._applies).any():
+            inside = self._filter.inside(observation, memory)
+            self._is_outside |= started & self._applies & ~inside
             self.reasons[started & self._is_outside] = self._terms.outside_reason
+            self._note()
 
     def watch(
         self, surprise: Array, observation: Array, memory: Any, idle: BoolArray | None
@@ -130,15 +136,21 @@ class Applicability:
             memory: the filter's, which has concluded it.
             idle: episodes that only go along, (n,).
         """
-        if not (self._is_outside | self.applies).any():
+        watched = self._applies | self._is_outside
+        if idle is not None:
+            watched &= ~idle
+        if not watched.any():
             return
-        awake = True if idle is None else ~idle
         broken, reason_of = self._terms.broken(surprise, observation)
-        for i in np.flatnonzero(broken & awake & (self.applies | self._is_outside)).tolist():
-            self.reasons[i], self._is_outside[i] = reason_of(i), False
+        for i in np.flatnonzero(broken & watched).tolist():
+            self.reasons[i], self._is_outside[i], self._applies[i] = reason_of(i), False, False
         if self._is_outside.any():
             returned = self._is_outside & self._filter.inside(observation, memory)
             self.reasons[returned], self._is_outside[returned] = "", False
+            self._applies |= returned
+
+    def _note(self) -> None:
+        self._applies = self.reasons == ""
 
     @cached_property
     def configuration_reason(self) -> str:

@@ -9,7 +9,7 @@ from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
 from defmanip_gym.theory.filters.decision import decide
 from defmanip_gym.theory.filters.foresight import advance
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
-from defmanip_gym.theory.filters.sensed import Sensed
+from defmanip_gym.theory.filters.sensed import Sensed, gained_acceleration
 from defmanip_gym.theory.filters.storage import storage_at, swing_step
 
 
@@ -30,34 +30,56 @@ def decide_all(
 
 
 @compiled
-def foresee_all(setup: StorageLevels, commands: Array, sensed: Sensed, foreseen: Array) -> None:
-    """Write the mean accelerations (n, 3) m/s² that commands (n, 3) of a period should make."""
+def compare_all(
+    setup: StorageLevels,
+    commands: Array,
+    before: Sensed,
+    after: Sensed,
+    residual: Array,
+    surprise: Array,
+) -> None:
+    """Write what a period's acceleration had beside what was foreseen, and how that has changed.
+
+    Args:
+        setup: with the robot.
+        commands: of the period, (n, 3) m/s².
+        before: n states.
+        after: those a period later.
+        residual: of the period before, and then of this, (n, 3) m/s².
+        surprise: by how much it has changed, (n, 3) m/s².
+    """
     limits = setup.limits
     for i in range(len(commands)):
         forward, left, up = limited_acceleration(
             commands[i, 0],
             commands[i, 1],
             commands[i, 2],
-            sensed.velocity_b[i, 0],
-            sensed.velocity_b[i, 1],
-            sensed.velocity_b[i, 2],
+            before.velocity_b[i, 0],
+            before.velocity_b[i, 1],
+            before.velocity_b[i, 2],
             limits.max_speed_m_s,
             limits.period_s,
         )
-        foreseen[i, 0], foreseen[i, 1], foreseen[i, 2], _ = mean_acceleration(
+        forward, left, up, _ = mean_acceleration(
             limits.arm,
             limits.rule,
             forward,
             left,
             up,
-            sensed.pitch[i, 0],
-            sensed.pitch[i, 1],
-            sensed.pitch_rate[i, 0],
-            sensed.pitch_rate[i, 1],
-            sensed.base_velocity[i, 0],
-            sensed.base_velocity[i, 1],
+            before.pitch[i, 0],
+            before.pitch[i, 1],
+            before.pitch_rate[i, 0],
+            before.pitch_rate[i, 1],
+            before.base_velocity[i, 0],
+            before.base_velocity[i, 1],
             limits.period_s,
         )
+        gained = gained_acceleration(before, after, i, limits.period_s)
+        forward, left, up = gained[0] - forward, gained[1] - left, gained[2] - up
+        surprise[i, 0] = forward - residual[i, 0]
+        surprise[i, 1] = left - residual[i, 1]
+        surprise[i, 2] = up - residual[i, 2]
+        residual[i, 0], residual[i, 1], residual[i, 2] = forward, left, up
 
 
 @compiled
@@ -93,7 +115,6 @@ def misjudge_all(
     setup: StorageLevels,
     before: Sensed,
     after: Sensed,
-    gained: Array,
     room: DecisionRoom,
     shares: Array,
 ) -> None:
@@ -103,11 +124,11 @@ def misjudge_all(
         setup: of which the first beam is carried.
         before: n states.
         after: those a period later.
-        gained: the period's mean acceleration, (n, 3) m/s².
         room: for intermediate results.
         shares: the result, (n,).
     """
     for i in range(len(shares)):
+        forward, _, up = gained_acceleration(before, after, i, setup.limits.period_s)
         yaw_rate, later_yaw_rate = before.base_velocity[i, 1], after.base_velocity[i, 1]
         for j in range(len(room.swing)):
             room.swing[j], room.swing_rate[j] = before.swing[i, j], before.swing_rate[i, j]
@@ -116,8 +137,8 @@ def misjudge_all(
             0,
             room.swing,
             room.swing_rate,
-            gained[i, 0],
-            gained[i, 2],
+            forward,
+            up,
             0.5 * (yaw_rate + later_yaw_rate),
             setup.limits.period_s,
             room.storage,

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from math import atan2, cos, floor, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.theory.dynamics.chain import Array
-from defmanip_gym.theory.dynamics.frames import base_to_world
+
+_SLICES = ObservationLayout(1).slices  # the first ones do not depend on the segments
+_HEADING = _SLICES["heading"].start
+_VELOCITY = _SLICES["grasp_velocity_b"].start
+_BASE = _SLICES["base_velocity"].start
+_JOINTS = _SLICES["joints"].start
+_RATES = _SLICES["joint_rates"].start
+_SWING = _SLICES["swing"].start
 
 
 class Sensed(NamedTuple):
@@ -48,17 +57,10 @@ class Sensed(NamedTuple):
                 f"(n, {layout.size}), of {layout.segment_count} segments",
                 "Filter the environment that the filter was made for.",
             )
-        values = np.asarray(observation, dtype=np.float64)
-        sine, cosine = layout.part(values, "heading").T
-        return cls(
-            velocity_b=layout.part(values, "grasp_velocity_b").copy(),
-            base_velocity=layout.part(values, "base_velocity").copy(),
-            pitch=layout.part(values, "joints").cumsum(axis=1),
-            pitch_rate=layout.part(values, "joint_rates").cumsum(axis=1),
-            swing=layout.part(values, "swing").copy(),
-            swing_rate=layout.part(values, "swing_rate").copy(),
-            heading=np.arctan2(sine, cosine),
-        )
+        values = np.ascontiguousarray(observation, dtype=np.float64)
+        sensed = cls.empty(len(values), layout.segment_count)
+        _read_all(values, layout.segment_count, sensed)
+        return sensed
 
     @classmethod
     def empty(cls, count: int, segments: int) -> Sensed:
@@ -75,11 +77,34 @@ class Sensed(NamedTuple):
         return Sensed(*chosen)
 
 
-def gained_acceleration(before: Sensed, after: Sensed, period_s: float) -> Array:
-    """Return the mean acceleration of a period, (n, 3) m/s², in the base frame of its middle."""
-    turned = after.heading - before.heading
-    turned = (turned + np.pi) % (2 * np.pi) - np.pi
-    later = base_to_world(after.velocity_b, turned / 2)
-    earlier = base_to_world(before.velocity_b, -turned / 2)
-    gained: Array = (later - earlier) / period_s
-    return gained
+@compilable
+def gained_acceleration(
+    before: Sensed, after: Sensed, i: int, period_s: float
+) -> tuple[float, float, float]:
+    """Return the mean acceleration of a period, m/s², in the base frame of its middle."""
+    turned = after.heading[i] - before.heading[i]
+    turned -= 2.0 * pi * floor((turned + pi) / (2.0 * pi))
+    cosine, sine = cos(0.5 * turned), sin(0.5 * turned)
+    then, now = before.velocity_b, after.velocity_b
+    forward = cosine * now[i, 0] - sine * now[i, 1] - (cosine * then[i, 0] + sine * then[i, 1])
+    left = sine * now[i, 0] + cosine * now[i, 1] - (cosine * then[i, 1] - sine * then[i, 0])
+    return forward / period_s, left / period_s, (now[i, 2] - then[i, 2]) / period_s
+
+
+@compiled
+def _read_all(observation: Array, segments: int, sensed: Sensed) -> None:
+    """Take n states out of observations (n, size), whose order is ``ObservationLayout``'s."""
+    for i in range(len(observation)):
+        row = observation[i]
+        sensed.heading[i] = atan2(row[_HEADING], row[_HEADING + 1])
+        for k in range(3):
+            sensed.velocity_b[i, k] = row[_VELOCITY + k]
+        for k in range(2):
+            sensed.base_velocity[i, k] = row[_BASE + k]
+        sensed.pitch[i, 0] = row[_JOINTS]
+        sensed.pitch[i, 1] = row[_JOINTS] + row[_JOINTS + 1]
+        sensed.pitch_rate[i, 0] = row[_RATES]
+        sensed.pitch_rate[i, 1] = row[_RATES] + row[_RATES + 1]
+        for j in range(segments):
+            sensed.swing[i, j] = row[_SWING + j]
+            sensed.swing_rate[i, j] = row[_SWING + segments + j]

@@ -23,8 +23,8 @@ from defmanip_gym.theory.dynamics.robot_model import (
 from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
 from defmanip_gym.theory.filters.batches import (
     advance_all,
+    compare_all,
     decide_all,
-    foresee_all,
     misjudge_all,
     store_all,
 )
@@ -38,7 +38,7 @@ from defmanip_gym.theory.filters.safety_filter import (
     SafetyFilter,
     finite_accelerations,
 )
-from defmanip_gym.theory.filters.sensed import Sensed, gained_acceleration
+from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.filters.swing_estimate import SwingEstimate
 from defmanip_gym.validation import plain, require_params
@@ -139,11 +139,11 @@ class StorageFilter(SafetyFilter):
             vectors,
             numbers,
         )
-        self._foresee = machine_code(foresee_all, self.setup, vectors, sensed, vectors)
-        self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
-        self._misjudge = machine_code(
-            misjudge_all, self.setup, sensed, sensed, vectors, self._room, numbers
+        self._compare = machine_code(
+            compare_all, self.setup, vectors, sensed, sensed, vectors, vectors
         )
+        self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
+        self._misjudge = machine_code(misjudge_all, self.setup, sensed, sensed, self._room, numbers)
         if self.conditions.delay_periods:
             self._advance = machine_code(
                 advance_all, self.setup, vectors, vectors, sensed, self._room
@@ -212,9 +212,11 @@ class StorageFilter(SafetyFilter):
         """
         sensed, uncertainty = self._estimated(observation, memory)
         wished = finite_accelerations(wished_m_s2, len(sensed.swing))
-        memory.before = Sensed(*(part.copy() for part in sensed))
-        for commands in memory.under_way[:-1]:
-            self._advance(self.setup, commands, memory.residual, sensed, self._room)
+        memory.before = sensed
+        if self.conditions.delay_periods:
+            sensed = Sensed(*(part.copy() for part in sensed))
+            for commands in memory.under_way[:-1]:
+                self._advance(self.setup, commands, memory.residual, sensed, self._room)
         allowed, margin = np.empty_like(wished), np.empty(len(wished))
         self._decide(
             self.setup,
@@ -236,13 +238,11 @@ class StorageFilter(SafetyFilter):
             By how much accelerations were others than foreseen, (n, 3) m/s².
         """
         after = Sensed.observed(self._layout, observation)
-        foreseen = np.empty_like(memory.residual)
-        self._foresee(self.setup, memory.under_way[0], memory.before, foreseen)
-        gained = gained_acceleration(memory.before, after, self.task.control_period_s)
-        residual = gained - foreseen
-        surprise = residual - memory.residual
-        memory.residual = residual
-        memory.under_way = np.concatenate((memory.under_way[1:], memory.under_way[:1]))
+        surprise = np.empty_like(memory.residual)
+        commands, before = memory.under_way[0], memory.before
+        self._compare(self.setup, commands, before, after, memory.residual, surprise)
+        if self.conditions.delay_periods:
+            memory.under_way = np.concatenate((memory.under_way[1:], memory.under_way[:1]))
         if self.conditions.swing_noise_rad:
             memory.estimate.update(after.swing, after.swing_rate)
         return surprise
@@ -301,9 +301,8 @@ class StorageFilter(SafetyFilter):
         As shares of V_σ, from observations (n, size) without noise before and after it.
         """
         then, now = (Sensed.observed(self._layout, each) for each in (before, after))
-        gained = gained_acceleration(then, now, self.task.control_period_s)
-        shares = np.empty(len(gained))
-        self._misjudge(self.setup, then, now, gained, self._room, shares)
+        shares = np.empty(len(then.swing))
+        self._misjudge(self.setup, then, now, self._room, shares)
         return shares
 
     def _estimated(self, observation: Array, memory: StorageMemory) -> tuple[Sensed, Array]:
