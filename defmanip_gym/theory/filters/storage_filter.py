@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -43,6 +44,7 @@ from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.filters.swing_estimate import SwingEstimate
 from defmanip_gym.validation import plain, require_params
 
+_ARGUMENTS = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
 _LEAST_BEND_RAD = 0.6
 _LEAST_HEIGHT_SHARE = 1.5  # of the lowest grasp that ends no episode
 _EDGE_POINTS = 1001
@@ -152,8 +154,11 @@ class StorageFilter(SafetyFilter):
     @property
     def specification(self) -> dict[str, Any]:
         """What the filter was made with, as JSON values."""
-        names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
-        return {"name": self.name} | {name: plain(getattr(self, name)) for name in names}
+        return {"name": self.name} | {name: plain(getattr(self, name)) for name in _ARGUMENTS}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # machine code cannot be pickled: a copy makes its own
+        return partial(type(self), **{name: getattr(self, name) for name in _ARGUMENTS}), ()
 
     @property
     def errors_m_s2(self) -> tuple[float, float, float]:
@@ -174,8 +179,7 @@ class StorageFilter(SafetyFilter):
         return self._with(beam=beam, intervals=PayloadIntervals())
 
     def _with(self, **changes: Any) -> Self:
-        names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
-        return type(self)(**{name: getattr(self, name) for name in names} | changes)
+        return type(self)(**{name: getattr(self, name) for name in _ARGUMENTS} | changes)
 
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
