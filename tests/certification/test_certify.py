@@ -7,6 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from defmanip_gym.attack import certificate as certificate_module
 from defmanip_gym.attack.result import AttackResult
@@ -16,9 +17,12 @@ from defmanip_gym.certification import table
 from defmanip_gym.certification.command import run_certify
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import compute_ladder
+from defmanip_gym.certification.phase_plot import draw_phase, has_phase_plane
 from defmanip_gym.cli import main
 from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError
+from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 HOSE = str(files("defmanip_gym.objects") / "examples" / "hose.xml")
 
@@ -38,6 +42,64 @@ def test_the_papers_beam_gets_the_whole_ladder_attacked(tmp_path, capsys):
     assert 0.9 < written["certificates"]["l1"]["tightness"] < 1.0
     assert "1.089e-03" in printed and "phase_plane" in printed
     assert (tmp_path / "ladder.png").stat().st_size > 10_000
+
+
+def test_filters_are_told_beside_the_bounds(tmp_path, capsys):
+    run_certify(CertifyConfig(attack=False, output=tmp_path))
+    written = json.loads((tmp_path / "certificates.json").read_text())["filters"]["storage"]
+    mass, length = CertifyConfig().mass, CertifyConfig().length
+    lowest = mass * GRAVITY_M_S2 * length / 2 * (1 - math.cos(math.pi / 6))
+    assert written["pass_j"] == pytest.approx(lowest)
+    made = StorageFilter()
+    assert written["level_share"] == made.level_share and written["segment_at_sigma"] == 0
+    swing = math.acos(1 - made.level_share * (1 - math.cos(made.sigma_rad)))
+    assert written["amplitude_share_of_sigma"] == pytest.approx(swing / made.sigma_rad, abs=2e-3)
+    printed = capsys.readouterr().out
+    assert "1 of 1" in printed and f"{100 * made.level_share:.1f}" in printed
+
+
+@pytest.mark.parametrize(
+    "beam", [{}, {"segments": 2, "joint_damping": 0.0}], ids=["one hinge", "two"]
+)
+def test_of_an_undamped_beam_filters_alone_are_told(beam, tmp_path, capsys):
+    run_certify(CertifyConfig(damping=0.0, output=tmp_path, **beam))
+    written = json.loads((tmp_path / "certificates.json").read_text())
+    assert written["certificates"] == {} and written["attack"] is None
+    assert "add damping" in written["refusals"]["l1"]
+    assert written["filters"]["storage"]["level_share"] > 0.9
+    printed = capsys.readouterr().out
+    assert "No bound on the acceleration" in printed and "needs damping" in printed
+    assert (tmp_path / "ladder.png").stat().st_size > 5_000
+
+
+def test_of_many_segments_the_one_at_the_pass_is_named():
+    (line,) = ladder(segments=4, attack=False).filters
+    assert line.segment == 3 and line.amplitude_share is None
+    assert line.pass_j < ladder(attack=False).filters[0].pass_j
+
+
+def test_a_filter_without_room_says_why(capsys, tmp_path):
+    run_certify(CertifyConfig(sigma=0.002, attack=False, output=tmp_path))
+    written = json.loads((tmp_path / "certificates.json").read_text())["filters"]["storage"]
+    assert written["level_share"] is None and "errors" in written["refusal"]
+    assert "No storage filter" in capsys.readouterr().out
+
+
+def test_sets_of_one_hinge_are_drawn_within_sigma():
+    axes = Figure().subplots()
+    draw_phase(axes, ladder(attack=False))
+    kept, reached = (patch.get_xy() for patch in axes.patches)
+    assert 0.9 < np.abs(kept[:, 0]).max() < 1.0
+    assert 0.99 < np.abs(reached[:, 0]).max() < 1.0 + 1e-6
+    labels = axes.get_legend_handles_labels()[1]
+    assert any("storage" in text for text in labels) and any("phase_plane" in t for t in labels)
+    assert not has_phase_plane(ladder(segments=2, attack=False))
+
+
+def test_of_a_file_it_says_that_filters_do_not_know_it_yet(tmp_path, capsys):
+    run_certify(CertifyConfig(mjcf=HOSE, attack=False, output=tmp_path))
+    assert "not yet for objects from files" in " ".join(capsys.readouterr().out.split())
+    assert json.loads((tmp_path / "certificates.json").read_text())["filters"] == {}
 
 
 def test_a_model_file_is_certified_by_name_of_its_grasp_site():
@@ -138,7 +200,7 @@ def test_methods_without_room_are_left_out_with_their_reason():
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        ({"damping": 0.0}, CertificateError),
+        ({"damping": 0.0, "initial_swing": 0.6}, CertificateError),
         ({"initial_swing": 0.6}, CertificateError),
         ({"mjcf": "missing.xml"}, ObjectFileError),
         ({"mjcf": HOSE, "grasp_site": "nowhere"}, ObjectFileError),
@@ -154,7 +216,7 @@ def test_what_cannot_be_certified_is_refused_in_words(options, error):
 
 
 def test_wrong_options_end_without_a_traceback(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["defmanip", "certify", "--damping", "0", "--no-attack"])
+    monkeypatch.setattr(sys, "argv", ["defmanip", "certify", "--segments", "0", "--no-attack"])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
