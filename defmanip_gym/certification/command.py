@@ -31,8 +31,7 @@ def run_certify(config: CertifyConfig) -> Path:
         with console.status("linearizing") as status:
             ladder = compute_ladder(config, status.update)
             console.print(ladder_table(ladder))
-            if ladder.filters:
-                console.print(filter_table(ladder.filters))
+            console.print(filter_table(ladder))
             for line in remarks(ladder):
                 console.print(line, highlight=False)
             status.update("writing")

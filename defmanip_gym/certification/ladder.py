@@ -12,7 +12,7 @@ from defmanip_gym.attack.certificate import attack_certificate, withstanding
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.attack.target import Target, beam_target, mjcf_target
 from defmanip_gym.certification.config import CertifyConfig
-from defmanip_gym.certification.filters import FilterLine, filter_lines
+from defmanip_gym.certification.filters import FilterLine, beam_lines, file_lines
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.objects.mjcf_object import mjcf_object
 from defmanip_gym.params import BeamParams
@@ -34,18 +34,21 @@ class Ladder:
 
     Attributes:
         linear: the object linearized.
+        sigma: σ, rad or m.
         conditions: what was asked of the motion.
         certificates: by method; those that exist, none of them proven for an undamped object.
         refusals: by method, why there is none.
-        filters: that know the state; none for an object from a file.
+        filters: that measure the swing.
         resonant_limit: amplitude of the forward sinusoid that uses up σ of the linear object, m/s².
         attack: on the tightest certificate, if asked for.
         withstanding: that certificate, lowered until attacks did not break it any more; None where
             it was not broken or is broken however low.
         target: the object on its rig, as attacked.
+        is_from_file: whether it is an object from a file.
     """
 
     linear: LinearizedObject
+    sigma: float
     conditions: CertificateConditions
     certificates: dict[str, Certificate]
     refusals: dict[str, str]
@@ -54,18 +57,13 @@ class Ladder:
     attack: AttackResult | None
     withstanding: Certificate | None
     target: Target
+    is_from_file: bool
 
     @property
     def tightest(self) -> Certificate | None:
         """The certificate with the largest bound that is one; None of an undamped object."""
         proven = [c for c in self.certificates.values() if c.is_proven]
         return max(proven, key=lambda c: c.acceleration_bound, default=None)
-
-    @property
-    def sigma(self) -> float:
-        """σ, rad or m."""
-        made = (*self.certificates.values(), *(line.made for line in self.filters))
-        return next(each.sigma_rad for each in made if each is not None)
 
     def is_broken(self, certificate: Certificate) -> bool:
         """Whether the attack's input is within this certificate and exceeds σ."""
@@ -94,6 +92,7 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         ObjectFileError: the model file cannot be used.
     """
     deformable: BeamParams | LinearizedObject
+    thing = None
     if config.mjcf is not None:
         tell(f"reading {config.mjcf}")
         thing = mjcf_object(config.mjcf, grasp_site=config.grasp_site)
@@ -119,16 +118,20 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         except CertificateError as error:
             refusals[method] = error
     tell("filters")
-    filters = filter_lines(config)
+    if thing is not None:
+        filters = file_lines(config, conditions, thing)
+    else:
+        filters = beam_lines(config, conditions, target.linear.coordinates)
     is_certified = any(certificate.is_proven for certificate in certificates.values())
     if not is_certified:
         refusal = refusals["l1"]  # the method that leaves most room to every object
         # only filters do without damping, and what else was asked for they cannot mend
-        if refusal.name != "damping" or not any(line.admits(conditions) for line in filters):
+        if refusal.name != "damping" or not any(line.admits for line in filters):
             raise refusal
     tell("nonlinear limit")
     ladder = Ladder(
         linear=target.linear,
+        sigma=config.sigma,
         conditions=conditions,
         certificates=certificates,
         refusals={method: str(error) for method, error in refusals.items()},
@@ -137,6 +140,7 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         attack=None,
         withstanding=None,
         target=target,
+        is_from_file=thing is not None,
     )
     tightest, longest_s = ladder.tightest, config.longest_attack_s
     if not config.attack or tightest is None:

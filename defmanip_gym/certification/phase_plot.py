@@ -28,9 +28,8 @@ def draw_phase(axes: Axes, ladder: Ladder) -> None:
         label = "±σ" if sign > 0 else None
         axes.axvline(sign, color=_INK, linewidth=0.9, linestyle="--", label=label)
     for line, colour in zip(ladder.filters, _COLOURS, strict=False):
-        if line.edge is not None and line.made is not None:
-            largest = line.made.task.max_acceleration_m_s2
-            label = f"kept by {line.name}, accelerations up to {largest:g} m/s²"
+        if line.edge is not None:
+            label = f"kept by {line.name}, accelerations up to {line.largest_m_s2:g} m/s²"
             _fill(axes, line.edge, ladder.sigma, colour, label)
     reached = _reached(ladder)
     if reached is not None and ladder.tightest is not None:

@@ -58,7 +58,7 @@ def remarks(ladder: Ladder) -> list[str]:
         return [
             "No bound on the acceleration holds for ever: a small periodic motion drives an "
             "undamped object to any swing.",
-            *filter_remarks(ladder.filters),
+            *filter_remarks(ladder),
         ]
     lines = [
         f"Each internal coordinate stays within σ = {certificate.sigma_rad:.4g} under "
@@ -78,7 +78,7 @@ def remarks(ladder: Ladder) -> list[str]:
         )
         if attack.is_broken:
             lines.append(_broken_remark(certificate, ladder.withstanding))
-    return [*lines, *filter_remarks(ladder.filters)]
+    return [*lines, *filter_remarks(ladder)]
 
 
 def _broken_remark(broken: Certificate, lowered: Certificate | None) -> str:
@@ -113,7 +113,7 @@ def numbers(config: CertifyConfig, ladder: Ladder) -> dict[str, Any]:
             for method, certificate in ladder.certificates.items()
         },
         "refusals": ladder.refusals,
-        "filters": filter_numbers(ladder.filters),
+        "filters": filter_numbers(ladder),
         "attack": _attack_numbers(ladder),
     }
 

@@ -25,6 +25,9 @@ from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 HOSE = str(files("defmanip_gym.objects") / "examples" / "hose.xml")
+ONE_HINGE = """<mujoco><worldbody><body><site name="grasp"/><geom size=".03" mass=".5"/><body>
+    <joint axis="0 -1 0" damping=".1"/><geom size=".05" pos="0 0 -.3" mass="1"/></body></body>
+    </worldbody></mujoco>"""
 
 
 def ladder(**options):
@@ -51,11 +54,11 @@ def test_filters_are_told_beside_the_bounds(tmp_path, capsys):
     lowest = mass * GRAVITY_M_S2 * length / 2 * (1 - math.cos(math.pi / 6))
     assert written["pass_j"] == pytest.approx(lowest)
     made = StorageFilter()
-    assert written["level_share"] == made.level_share and written["segment_at_sigma"] == 0
+    assert written["level_share"] == made.level_share and written["at_sigma"] == "segment 1"
     swing = math.acos(1 - made.level_share * (1 - math.cos(made.sigma_rad)))
     assert written["amplitude_share_of_sigma"] == pytest.approx(swing / made.sigma_rad, abs=2e-3)
     printed = capsys.readouterr().out
-    assert "1 of 1" in printed and f"{100 * made.level_share:.1f}" in printed
+    assert "segment 1" in printed and f"{100 * made.level_share:.1f}" in printed
 
 
 @pytest.mark.parametrize(
@@ -74,7 +77,7 @@ def test_of_an_undamped_beam_filters_alone_are_told(beam, tmp_path, capsys):
 
 def test_of_many_segments_the_one_at_the_pass_is_named():
     (line,) = ladder(segments=4, attack=False).filters
-    assert line.segment == 3 and line.amplitude_share is None
+    assert line.coordinate == "segment 4" and line.amplitude_rad is None
     assert line.pass_j < ladder(attack=False).filters[0].pass_j
 
 
@@ -96,10 +99,25 @@ def test_sets_of_one_hinge_are_drawn_within_sigma():
     assert not has_phase_plane(ladder(segments=2, attack=False))
 
 
-def test_of_a_file_it_says_that_filters_do_not_know_it_yet(tmp_path, capsys):
+def test_of_a_file_the_pass_is_told_as_found_by_a_search(tmp_path, capsys):
     run_certify(CertifyConfig(mjcf=HOSE, attack=False, output=tmp_path))
-    assert "not yet for objects from files" in " ".join(capsys.readouterr().out.split())
-    assert json.loads((tmp_path / "certificates.json").read_text())["filters"] == {}
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "proves nothing; no environment carries one yet" in printed
+    written = json.loads((tmp_path / "certificates.json").read_text())
+    (line,) = written["filters"].values()
+    assert line["at_sigma"] in written["coordinates"] and line["proof"] == "none"
+    assert 0 < line["level_share"] < 1 and line["pass_j"] > 0
+
+
+def test_of_an_undamped_object_from_a_file_the_filter_alone_is_told(tmp_path):
+    path = tmp_path / "pendulum.xml"
+    path.write_text(ONE_HINGE.replace('damping=".1"', ""))
+    one = ladder(mjcf=path, attack=False)
+    assert one.tightest is None
+    swing = 0.3 * 9.81 * (1 - math.cos(math.pi / 6))  # 1 kg at 0.3 m
+    assert one.filters[0].pass_j == pytest.approx(swing, rel=1e-3)
+    with pytest.raises(CertificateError, match="add damping"):
+        ladder(mjcf=path, attack=False, initial_swing=0.6)
 
 
 def test_a_model_file_is_certified_by_name_of_its_grasp_site():
@@ -107,11 +125,6 @@ def test_a_model_file_is_certified_by_name_of_its_grasp_site():
     assert hose.tightest.method == "l1"
     assert "phase_plane" not in hose.certificates
     assert {certificate.proof for certificate in hose.certificates.values()} == {"none", "linear"}
-
-
-ONE_HINGE = """<mujoco><worldbody><body><site name="grasp"/><geom size=".03" mass=".5"/><body>
-    <joint axis="0 -1 0" damping=".1"/><geom size=".05" pos="0 0 -.3" mass="1"/></body></body>
-    </worldbody></mujoco>"""
 
 
 def test_of_a_file_with_one_hinge_it_says_why_phase_plane_does_not_serve(tmp_path, capsys):
