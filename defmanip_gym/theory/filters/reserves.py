@@ -1,4 +1,4 @@
-"""What of V_σ sampling, errors, noise and delay cost: docs/derivations.md, section 14."""
+"""What of V_σ sampling, errors, noise and delay cost: docs/derivations.md, section 18."""
 
 from __future__ import annotations
 

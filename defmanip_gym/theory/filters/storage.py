@@ -7,7 +7,7 @@ about the vertical through the grasp and I_σ its largest within σ. Then
     Ḃ = −ż2ᵀ d_o22 ż2 − s_f a_f − s_u a_u + u2 u̇2 (I_σ − I_z),   B ≥ V,
 
 with s = m_o12ᵀ ż2 forward and upward, so that B does not rise either while |u2| does not.
-Derivation: docs/derivations.md, section 14.
+Derivation: docs/derivations.md, section 18.
 """
 
 from __future__ import annotations

@@ -99,6 +99,7 @@ class StorageFilter(SafetyFilter):
         self.sigma_rad = validated_sigma(sigma_rad)
         self.conditions = require_params("conditions", conditions, FilterConditions)
         self.intervals = require_params("intervals", intervals, PayloadIntervals)
+        beam, conditions, task = self.beam, self.conditions, self.task
         self.segment_count = beam.segment_count
         self._layout = ObservationLayout(beam.segment_count)
         self._model = StorageModel.of(self.intervals.corners(beam), self.sigma_rad)
