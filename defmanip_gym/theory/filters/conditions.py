@@ -19,13 +19,15 @@ _ROUNDING = 1e-9
 class FilterConditions:
     """Errors, noise and delay that a filter makes room for.
 
-    The errors are those of a period's mean acceleration about what the filter foresees: the
-    command, what sampling makes of it, and what came on top of that in the period before.
+    A period's mean acceleration is what sampling makes of the command, and an offset. The filter
+    counts on the offset of the period before; errors are its changes.
 
     Attributes:
         forward_error_m_s2: forward.
         lateral_error_m_s2: to the side.
         vertical_error_m_s2: upwards.
+        forward_offset_m_s2: how far the forward offset may be from zero.
+        vertical_offset_m_s2: and the vertical one.
         storage_error: of the storage after a period with just that acceleration, as a share of V_σ.
         swing_noise_rad: standard deviation of the measured swing angles.
         delay_periods: control periods until a command takes effect.
@@ -34,12 +36,20 @@ class FilterConditions:
     forward_error_m_s2: float = 0.17
     lateral_error_m_s2: float = 0.17
     vertical_error_m_s2: float = 0.15
+    forward_offset_m_s2: float = 0.2
+    vertical_offset_m_s2: float = 0.2
     storage_error: float = 0.0015
     swing_noise_rad: float = 0.0
     delay_periods: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("forward_error_m_s2", "lateral_error_m_s2", "vertical_error_m_s2"):
+        for name in (
+            "forward_error_m_s2",
+            "lateral_error_m_s2",
+            "vertical_error_m_s2",
+            "forward_offset_m_s2",
+            "vertical_offset_m_s2",
+        ):
             settle(self, name, require_number, 0.0, _LARGEST_ERROR, "m/s²")
         settle(self, "storage_error", require_number, 0.0, 1.0)
         settle(self, "swing_noise_rad", require_number, 0.0, 1.0, "rad")

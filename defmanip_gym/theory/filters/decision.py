@@ -98,8 +98,9 @@ def decide(
         moved, excess = _within(
             setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
         )
-    allowed[i, 0], allowed[i, 1], allowed[i, 2] = moved[0], moved[1], moved[2]
-    return -excess
+    for axis in range(3):  # zero where nothing can be foreseen, of an arm beyond its limits
+        allowed[i, axis] = moved[axis] if abs(moved[axis]) <= largest else 0.0
+    return -excess if excess < np.inf else -np.inf
 
 
 @compilable
@@ -198,7 +199,7 @@ def _safest(
 ) -> tuple[tuple[float, float, float], float]:
     """Return the command that leaves B smallest, of coasting and some dampings, and its excess."""
     limits = setup.limits
-    coast = clipped(coasting(setup, sensed, i), low, high)
+    coast = clipped(coasting(setup, sensed, i, residual), low, high)
     best = coast
     least = excess_after(setup, coast, sensed, i, residual, uncertainty, room)
     norm = np.sqrt(room.gradient[0] ** 2 + room.gradient[1] ** 2 + room.gradient[2] ** 2)

@@ -30,7 +30,11 @@ from defmanip_gym.theory.filters.batches import (
 )
 from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
 from defmanip_gym.theory.filters.limits import BRAKING_SHARE, RobotLimits, height_range
-from defmanip_gym.theory.filters.reserves import estimate_drift_rad, reserved_shares
+from defmanip_gym.theory.filters.reserves import (
+    estimate_drift_rad,
+    largest_momenta,
+    reserved_shares,
+)
 from defmanip_gym.theory.filters.safety_filter import (
     BoolArray,
     FilterDecision,
@@ -118,7 +122,11 @@ class StorageFilter(SafetyFilter):
         self.setup = StorageLevels(
             model=self._model,
             levels=shares * self._model.passes,
-            errors=np.array(self.errors_m_s2),
+            momenta=largest_momenta(self._model),
+            errors=np.minimum(
+                (conditions.delay_periods + 1) * np.array(self.errors_m_s2),
+                np.maximum(2 * np.array(self.offsets_m_s2), self.errors_m_s2),
+            ),
             residual=float(conditions.storage_error),
             limits=self._limits(),
         )
@@ -165,6 +173,12 @@ class StorageFilter(SafetyFilter):
             conditions.lateral_error_m_s2,
             conditions.vertical_error_m_s2,
         )
+
+    @property
+    def offsets_m_s2(self) -> tuple[float, float, float]:
+        """Offsets of acceleration that it provides for: forward, to the side (any), upwards."""
+        conditions = self.conditions
+        return conditions.forward_offset_m_s2, math.inf, conditions.vertical_offset_m_s2
 
     def with_conditions(self, **changes: Any) -> Self:
         """Return the same filter with other conditions, fields of ``FilterConditions``."""

@@ -170,7 +170,7 @@ def test_a_filter_is_made_again_from_its_specification():
 
 def test_errors_that_leave_nothing_are_refused_with_the_remedy():
     with pytest.raises(CertificateError, match="larger sigma_rad or smaller errors"):
-        StorageFilter(conditions=FilterConditions(forward_error_m_s2=9.0))
+        StorageFilter(conditions=FilterConditions(forward_offset_m_s2=30.0))
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_a_specification_of_something_else_is_refused():
 
 def test_errors_survive_pickling():
     with pytest.raises(CertificateError) as caught:
-        StorageFilter(conditions=FilterConditions(forward_error_m_s2=9.0))
+        StorageFilter(conditions=FilterConditions(forward_offset_m_s2=30.0))
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
