@@ -21,7 +21,8 @@ III                ``certificates``: ``low_gain`` (24)–(26); ``iss_gain`` (17)
 III, beyond        ``filters``: ``storage``, Lemma III.1's V as a barrier; ``safety_filter``,
                    ``conditions``, ``storage_filter``: the family and its closed form, built of
                    ``sensed``, ``period_mean``, ``limits``, ``decision``, ``foresight``,
-                   ``swing_estimate``
+                   ``swing_estimate``; ``backup``, ``backup_decision``, ``backup_filter``:
+                   rollouts of the nominal model
 IV.A, V            ``control``: ``velocity_field`` IV.A; ``control_laws`` (20), (27), (29);
                    ``continuous_loop`` (30)–(34); ``stability``, ``effective_damping``: what
                    sampling and wrong parameters make of it

@@ -138,14 +138,7 @@ def excess_after(
             + abs(leftward) * setup.errors[1]
             + abs(s_upward) * setup.errors[2]
         )
-        for j in range(len(room.swing)):
-            slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.storage.sine[j])
-            for k in range(len(room.swing)):
-                slope += abs(model.stiffness[c, j, k] * room.storage.swing[k])
-                curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
-                after += 0.5 * curvature * uncertainty[i, j]
-            curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
-            after += (slope + 0.5 * curvature) * uncertainty[i, j]
+        after += uncertain_storage(model, c, uncertainty, i, room.storage)
         excess = (after - setup.levels[c]) / model.passes[c] + setup.residual
         if excess > largest:
             largest = excess
@@ -154,6 +147,31 @@ def excess_after(
             room.gradient[1] = scale * leftward
             room.gradient[2] = scale * s_upward
     return largest
+
+
+@compilable
+def uncertain_storage(
+    model: StorageModel, c: int, uncertainty: Array, i: int, room: StorageRoom
+) -> float:
+    """Return how much more than in ``room`` may be stored, J, if angles are uncertain.
+
+    Args:
+        model: of the beams.
+        c: which of them.
+        uncertainty: of the swing, (n, N) rad.
+        i: which state.
+        room: what ``storage_at`` left of that state's swing, which is in ``room.swing``.
+    """
+    more = 0.0
+    for j in range(len(room.swing)):
+        slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.sine[j])
+        for k in range(len(room.swing)):
+            slope += abs(model.stiffness[c, j, k] * room.swing[k])
+            curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
+            more += 0.5 * curvature * uncertainty[i, j]
+        curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
+        more += (slope + 0.5 * curvature) * uncertainty[i, j]
+    return more
 
 
 @compilable
@@ -226,12 +244,12 @@ def decide(
         return -excess
     largest = limits.max_acceleration_m_s2
     low, high = (forward_low, -largest, up_low), (forward_high, largest, up_high)
-    moved, excess = _within(
+    moved, excess = within(
         setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
     )
     if excess > 0.0:  # rather out of the arm's range than beyond the level
         low, high = (forward_low, -largest, -largest), (forward_high, largest, largest)
-        moved, excess = _within(
+        moved, excess = within(
             setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
         )
     allowed[i, 0], allowed[i, 1], allowed[i, 2] = moved[0], moved[1], moved[2]
@@ -239,7 +257,7 @@ def decide(
 
 
 @compilable
-def _within(
+def within(
     setup: StorageLevels,
     wished: tuple[float, float, float],
     sensed: Sensed,

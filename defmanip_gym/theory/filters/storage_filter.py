@@ -102,15 +102,8 @@ class StorageFilter(SafetyFilter):
         self._layout = ObservationLayout(beam.segment_count)
         self._model = StorageModel.of(self.intervals.corners(beam), self.sigma_rad)
         self.pass_j = float(self._model.passes[0])
-        shares = 1.0 - self._reserves()
+        shares = self._level_shares()
         self.level_share = float(shares.min())
-        if not self.level_share >= _LEAST_LEVEL:
-            raise CertificateError(
-                "share of V_σ that errors, noise and delay leave",
-                self.level_share,
-                f"at least {_LEAST_LEVEL}",
-                "Allow a larger sigma_rad or smaller errors in conditions.",
-            )
         self.setup = StorageLevels(
             model=self._model,
             levels=shares * self._model.passes,
@@ -125,13 +118,24 @@ class StorageFilter(SafetyFilter):
             limits=self._limits(),
         )
         self._room = DecisionRoom.empty(self.segment_count)
+        self._advancing = self.setup  # with which model the state is moved through a delay
         self._compile()
+        self._compile_decision()
 
     @without_garbage_collection()
     def _compile(self) -> None:
-        sensed, vectors = Sensed.empty(1, self.segment_count), np.empty((1, 3))
-        uncertainty, numbers = np.empty((1, self.segment_count)), np.empty(1)
-        self._decide = machine_code(
+        sensed, vectors, numbers, _ = self._examples()
+        self._foresee = machine_code(foresee_all, self.setup, vectors, sensed, vectors)
+        self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
+        if self.conditions.delay_periods:
+            self._advance = machine_code(
+                advance_all, self.setup, vectors, vectors, sensed, self._room
+            )
+
+    @without_garbage_collection()
+    def _compile_decision(self) -> None:
+        sensed, vectors, numbers, uncertainty = self._examples()
+        self._decide_all = machine_code(
             decide_all,
             self.setup,
             vectors,
@@ -142,12 +146,20 @@ class StorageFilter(SafetyFilter):
             vectors,
             numbers,
         )
-        self._foresee = machine_code(foresee_all, self.setup, vectors, sensed, vectors)
-        self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
-        if self.conditions.delay_periods:
-            self._advance = machine_code(
-                advance_all, self.setup, vectors, vectors, sensed, self._room
-            )
+
+    def _examples(self) -> tuple[Sensed, Array, Array, Array]:
+        """Return states, vectors, numbers and uncertainties, from which compiled code learns types."""
+        swing = np.empty((1, self.segment_count))
+        return Sensed.empty(1, self.segment_count), np.empty((1, 3)), np.empty(1), swing
+
+    def _decide(
+        self, wished: Array, sensed: Sensed, residual: Array, uncertainty: Array
+    ) -> FilterDecision:
+        allowed, margin = np.empty_like(wished), np.empty(len(wished))
+        self._decide_all(
+            self.setup, wished, sensed, residual, uncertainty, self._room, allowed, margin
+        )
+        return FilterDecision(allowed, margin)
 
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
@@ -186,20 +198,10 @@ class StorageFilter(SafetyFilter):
         wished = finite_accelerations(wished_m_s2, len(sensed.swing))
         memory.before = Sensed(*(part.copy() for part in sensed))
         for commands in memory.under_way[:-1]:
-            self._advance(self.setup, commands, memory.residual, sensed, self._room)
-        allowed, margin = np.empty_like(wished), np.empty(len(wished))
-        self._decide(
-            self.setup,
-            wished,
-            sensed,
-            memory.residual,
-            uncertainty,
-            self._room,
-            allowed,
-            margin,
-        )
-        memory.under_way[-1] = allowed
-        return FilterDecision(allowed, margin)
+            self._advance(self._advancing, commands, memory.residual, sensed, self._room)
+        decision = self._decide(wished, sensed, memory.residual, uncertainty)
+        memory.under_way[-1] = decision.allowed_m_s2
+        return decision
 
     def conclude(self, observation: Array, memory: StorageMemory) -> Array:
         """Take note of the observations, (n, size), at the end of the period.
@@ -270,6 +272,18 @@ class StorageFilter(SafetyFilter):
         lightest = scipy.linalg.eigvalsh(inertia)[0]
         largest_rate = math.sqrt(2 * self.pass_j / lightest)
         return float(min(period_s**3 / 12 * squares[-1], period_s) * largest_rate)
+
+    def _level_shares(self) -> Array:
+        """Return up to which shares of V_σ B may rise, (C,), or raise CertificateError."""
+        shares = 1.0 - self._reserves()
+        if not shares.min() >= _LEAST_LEVEL:
+            raise CertificateError(
+                "share of V_σ that errors, noise and delay leave",
+                float(shares.min()),
+                f"at least {_LEAST_LEVEL}",
+                "Allow a larger sigma_rad or smaller errors in conditions.",
+            )
+        return shares
 
     def _reserves(self) -> Array:
         """Return the shares of V_σ that are kept back, (C,); docs/derivations.md, section 14."""
