@@ -20,7 +20,7 @@ from defmanip_gym.theory.filters.limits import braking, farthest_share
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import storage_at
 
-_HALVINGS = 6
+_HALVINGS = 5
 
 
 @compilable
@@ -157,6 +157,7 @@ def _nearest(
         tried = between(wanted, safe, far)
         if distance(tried, wanted) < nearest:
             chosen, margin, nearest = tried, left, distance(tried, wanted)
+            break
     return chosen, margin
 
 

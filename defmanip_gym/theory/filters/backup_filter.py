@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import scipy.linalg
@@ -20,10 +21,11 @@ from defmanip_gym.theory.filters.storage_filter import StorageFilter, StorageMem
 from defmanip_gym.theory.payload.object_model import HangingBeam
 
 _HORIZON = 100  # periods
-_RATES = (12.0, 4.0, 0.0)  # 1/s, of the backup laws; 0 coasts
+_RATES = (12.0, 4.0)  # 1/s, of the backup laws
 _LEAST_SHARE = 0.5  # of V_σ: where errors leave less, rollouts have to reckon with them alone
-_MOST_SUBSTEPS = 4
-_STEP_RAD = 2.0  # of the fastest vibration a substep covers at most this
+_FEWEST_SUBSTEPS, _MOST_SUBSTEPS = 2, 4
+_STEP_RAD = 1.5  # of the fastest vibration that a substep should cover
+_RESERVE = 0.01  # of σ: between substeps, and for what integrators differ in within a period
 
 
 class BackupFilter(StorageFilter):
@@ -55,7 +57,7 @@ class BackupFilter(StorageFilter):
     proof: FilterProof = "nominal"
 
     def covers(self, beam: BeamParams) -> bool:
-        """Whether it holds for this beam: the believed one within the intervals, not less damped."""
+        """Whether it holds for this beam: within the intervals, and not damped less."""
         is_damped = (
             beam.damping >= self.beam.damping and beam.joint_damping >= self.beam.joint_damping
         )
@@ -86,7 +88,7 @@ class BackupFilter(StorageFilter):
         self._backup_room = BackupRoom.empty(self.segment_count)
         sensed, vectors, numbers, uncertainty = self._examples()
         room = self._backup_room
-        self._decide_all = machine_code(
+        self._decide_all: Callable[..., None] = machine_code(
             decide_backup_all,
             self.backup,
             vectors,
@@ -109,6 +111,7 @@ class BackupFilter(StorageFilter):
         error = conditions.forward_error_m_s2
         error += math.sin(self.sigma_rad) * conditions.vertical_error_m_s2
         tube = error * np.max([pushed for pushed, _, _ in tubes], axis=0)
+        tube += _RESERVE * self.sigma_rad
         first = tube[1 + conditions.delay_periods].max()
         if not first < self.sigma_rad:
             raise CertificateError(
@@ -126,7 +129,7 @@ class BackupFilter(StorageFilter):
             tube=tube,
             spread=np.max([spread for _, spread, _ in tubes], axis=0),
             rates=np.array(_RATES),
-            substeps=min(substeps, _MOST_SUBSTEPS),
+            substeps=min(max(substeps, _FEWEST_SUBSTEPS), _MOST_SUBSTEPS),
             delay=int(conditions.delay_periods),
         )
 

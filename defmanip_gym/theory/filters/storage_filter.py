@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -135,7 +136,7 @@ class StorageFilter(SafetyFilter):
     @without_garbage_collection()
     def _compile_decision(self) -> None:
         sensed, vectors, numbers, uncertainty = self._examples()
-        self._decide_all = machine_code(
+        self._decide_all: Callable[..., None] = machine_code(
             decide_all,
             self.setup,
             vectors,
@@ -148,7 +149,7 @@ class StorageFilter(SafetyFilter):
         )
 
     def _examples(self) -> tuple[Sensed, Array, Array, Array]:
-        """Return states, vectors, numbers and uncertainties, from which compiled code learns types."""
+        """Return states, vectors, numbers, uncertainties: compiled code learns types from them."""
         swing = np.empty((1, self.segment_count))
         return Sensed.empty(1, self.segment_count), np.empty((1, 3)), np.empty(1), swing
 
