@@ -196,18 +196,19 @@ def _rolled_out(
             break
         s_forward, s_upward, inertia = power_of(storage.model, c, swung)
         reach, _ = reach_and_height(limits.arm, ahead.pitch[0, 0], ahead.pitch[0, 1])
-        gained += setup.storage.residual * storage.model.passes[c]
-        gained += limits.period_s * (
-            abs(s_forward) * storage.errors[0]
-            + abs(yaw_rate * inertia / reach) * storage.errors[1]
-            + abs(s_upward) * storage.errors[2]
-        )
         stored = gained + storage_at(
             storage.model, c, swung.swing, swung.swing_rate, ahead.base_velocity[0, 1], swung
         )
         stored += uncertain_storage(storage.model, c, uncertainty, i, swung)
         if stored <= storage.levels[c]:
             return left / setup.sigma
+        # errors of the last period are the next decision's, and storage has made room for them
+        gained += setup.storage.residual * storage.model.passes[c]
+        gained += limits.period_s * (
+            abs(s_forward) * storage.errors[0]
+            + abs(yaw_rate * inertia / reach) * storage.errors[1]
+            + abs(s_upward) * storage.errors[2]
+        )
         for j in range(len(swung.swing)):
             ahead.swing[0, j], ahead.swing_rate[0, j] = swung.swing[j], swung.swing_rate[j]
     return min(left / setup.sigma, _NOT_REACHED)
