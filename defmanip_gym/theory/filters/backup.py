@@ -39,7 +39,7 @@ class BackupSetup(NamedTuple):
 
     Attributes:
         storage: levels at which the storage filter takes over; robot and errors.
-        rolled: the beams with their damping.
+        rolled: the beams with each damping that they may have: beam c is c, c + C, c + 2 C, …
         sigma: σ, rad.
         tube: what is kept back of σ after p periods, (P + 1, N) rad.
         spread: what an uncertainty of 1 rad of all angles has become after p periods, (P + 1, N).
@@ -140,9 +140,9 @@ def shown_margin(
         is_patient: roll on after the tube is left, to learn how far.
     """
     least = np.inf
-    for c in range(len(setup.storage.levels)):
+    for r in range(len(setup.rolled.mass)):
         margin = _rolled_out(
-            setup, c, command, rate, sensed, i, residual, uncertainty, room, is_patient
+            setup, r, command, rate, sensed, i, residual, uncertainty, room, is_patient
         )
         least = min(least, margin)
         if least < 0.0 and not is_patient:
@@ -153,7 +153,7 @@ def shown_margin(
 @compilable
 def _rolled_out(
     setup: BackupSetup,
-    c: int,
+    r: int,
     command: tuple[float, float, float],
     rate: float,
     sensed: Sensed,
@@ -164,6 +164,7 @@ def _rolled_out(
     is_patient: bool,
 ) -> float:
     storage, ahead, swung = setup.storage, room.ahead, room.decision.storage
+    c = r % len(storage.levels)
     limits = storage.limits
     step_s = limits.period_s / setup.substeps
     _copy(sensed, i, ahead)
@@ -179,7 +180,7 @@ def _rolled_out(
         for _ in range(setup.substeps):
             swing_step(
                 setup.rolled,
-                c,
+                r,
                 swung.swing,
                 swung.swing_rate,
                 forward,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
@@ -57,11 +58,8 @@ class BackupFilter(StorageFilter):
     proof: FilterProof = "nominal"
 
     def covers(self, beam: BeamParams) -> bool:
-        """Whether it holds for this beam: within the intervals, and not damped less."""
-        is_damped = (
-            beam.damping >= self.beam.damping and beam.joint_damping >= self.beam.joint_damping
-        )
-        return is_damped and super().covers(beam)
+        """Whether it holds for this beam: the believed one within the intervals, damping too."""
+        return self.intervals.cover_damping(self.beam, beam) and super().covers(beam)
 
     def inside(self, observation: Array, memory: StorageMemory) -> BoolArray:
         """Whether B is below its level or a backup law, from now on, is shown to be safe, (n,)."""
@@ -104,7 +102,12 @@ class BackupFilter(StorageFilter):
         )
 
     def _backup_setup(self) -> BackupSetup:
-        beams = self.intervals.corners(self.beam)
+        corners = self.intervals.corners(self.beam)
+        beams = tuple(
+            replace(beam, damping=root, joint_damping=joint)
+            for root, joint in self.intervals.dampings(self.beam)
+            for beam in corners
+        )
         period_s = self.task.control_period_s
         tubes = [_deviations(beam, period_s) for beam in beams]
         conditions = self.conditions

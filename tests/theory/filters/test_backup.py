@@ -1,6 +1,7 @@
 """Backup: what the nominal model shows when it is rolled out, without the plant."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,11 +169,14 @@ def test_delay_asks_for_more_of_sigma():
     assert margins[0] < margins[1]
 
 
-def test_it_covers_beams_that_are_damped_as_much_or_more():
-    safety = BackupFilter(BeamParams(damping=0.1, segment_count=2))
-    assert safety.covers(BeamParams(damping=1.0, segment_count=2))
-    assert not safety.covers(BeamParams(damping=0.0, segment_count=2))
-    assert not safety.covers(BeamParams(damping=0.1, segment_count=2, joint_damping=0.01))
+def test_it_covers_the_damping_that_it_rolls_out():
+    believed = BeamParams(damping=0.1, segment_count=2)
+    exact = BackupFilter(believed)
+    wide = BackupFilter(believed, intervals=PayloadIntervals(damping=(0.1, 10.0)))
+    for true in (replace(believed, damping=1.0), replace(believed, joint_damping=0.02)):
+        assert wide.covers(true) and not exact.covers(true)
+    assert exact.covers(believed)
+    assert not wide.covers(replace(believed, damping=2.0))
 
 
 def test_wrong_input_is_refused():
