@@ -4,7 +4,7 @@ A backup law drives the beam's momentum s = m_o12ᵀ ż2 out, w = r s / m within
 carry out, or coasts (r = 0). A command may pass if after it some law keeps ‖z2‖∞ ≤ σ, less a tube
 for errors, until B is below its level: from there on the storage filter keeps it. The law's own
 command starts the rest of the same rollout, so where one has passed another will: always feasible
-for the model that is rolled out. Derivation: docs/derivations.md, section 14.
+for the model that is rolled out. Derivation: docs/derivations.md, section 18.
 """
 
 from __future__ import annotations
