@@ -86,16 +86,9 @@ class BackupFilter(StorageFilter):
         self._backup_room = BackupRoom.empty(self.segment_count)
         sensed, vectors, numbers, uncertainty = self._examples()
         room = self._backup_room
+        setup, examples = self.backup, (vectors, sensed, vectors, uncertainty)
         self._decide_all: Callable[..., None] = machine_code(
-            decide_backup_all,
-            self.backup,
-            vectors,
-            sensed,
-            vectors,
-            uncertainty,
-            room,
-            vectors,
-            numbers,
+            decide_backup_all, setup, *examples, room, vectors, numbers
         )
         self._show_all = machine_code(
             show_all, self.backup, sensed, vectors, uncertainty, room, numbers

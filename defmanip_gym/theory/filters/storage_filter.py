@@ -136,16 +136,9 @@ class StorageFilter(SafetyFilter):
     @without_garbage_collection()
     def _compile_decision(self) -> None:
         sensed, vectors, numbers, uncertainty = self._examples()
+        room = self._room
         self._decide_all: Callable[..., None] = machine_code(
-            decide_all,
-            self.setup,
-            vectors,
-            sensed,
-            vectors,
-            uncertainty,
-            self._room,
-            vectors,
-            numbers,
+            decide_all, self.setup, vectors, sensed, vectors, uncertainty, room, vectors, numbers
         )
 
     def _examples(self) -> tuple[Sensed, Array, Array, Array]:

@@ -179,6 +179,12 @@ def test_it_covers_the_damping_that_it_rolls_out():
     assert not wide.covers(replace(believed, damping=2.0))
 
 
+def test_factors_on_damping_are_not_negative_and_around_the_believed_one():
+    for factors in ((-1.0, 1.0), (2.0, 3.0)):
+        with pytest.raises(ParameterError, match="damping"):
+            PayloadIntervals(damping=factors)
+
+
 def test_wrong_input_is_refused():
     safety = BackupFilter(whip(2))
     memory, state = safety.memory(1), observed(hanging(2))
