@@ -134,14 +134,7 @@ def excess_after(
             + abs(leftward) * setup.errors[1]
             + abs(s_upward) * setup.errors[2]
         )
-        for j in range(len(room.swing)):
-            slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.storage.sine[j])
-            for k in range(len(room.swing)):
-                slope += abs(model.stiffness[c, j, k] * room.storage.swing[k])
-                curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
-                after += 0.5 * curvature * uncertainty[i, j]
-            curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
-            after += (slope + 0.5 * curvature) * uncertainty[i, j]
+        after += uncertain_storage(model, c, uncertainty, i, room.storage)
         excess = (after - setup.levels[c]) / model.passes[c] + setup.residual
         if excess > largest:
             largest = excess
@@ -153,6 +146,31 @@ def excess_after(
 
 
 @compilable
+def uncertain_storage(
+    model: StorageModel, c: int, uncertainty: Array, i: int, room: StorageRoom
+) -> float:
+    """Return how much more than in ``room`` may be stored, J, if angles are uncertain.
+
+    Args:
+        model: of the beams.
+        c: which of them.
+        uncertainty: of the swing, (n, N) rad.
+        i: which state.
+        room: what ``storage_at`` left of that state's swing, which is in ``room.swing``.
+    """
+    more = 0.0
+    for j in range(len(room.swing)):
+        slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.sine[j])
+        for k in range(len(room.swing)):
+            slope += abs(model.stiffness[c, j, k] * room.swing[k])
+            curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
+            more += 0.5 * curvature * uncertainty[i, j]
+        curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
+        more += (slope + 0.5 * curvature) * uncertainty[i, j]
+    return more
+
+
+@compilable
 def speed_excess(limit: float, forward: float, left: float, up: float) -> float:
     """Return by how much a velocity is faster than a limit, m/s."""
     return max(sqrt(forward**2 + left**2 + up**2) - limit, 0.0)
@@ -160,9 +178,9 @@ def speed_excess(limit: float, forward: float, left: float, up: float) -> float:
 
 @compilable
 def coasting(
-    setup: StorageLevels, sensed: Sensed, i: int, residual: Array
+    setup: StorageLevels, sensed: Sensed, i: int, beside: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return the command under which B does not rise: what makes up for the residual.
+    """Return the command under which B does not rise: what makes up for acceleration beside it.
 
     A base that is pushed backwards turns away by itself; holding its yaw rate slows the grasp.
     """
@@ -171,4 +189,4 @@ def coasting(
     reach_rate = rho_1 * sensed.pitch_rate[i, 0] + rho_2 * sensed.pitch_rate[i, 1]
     pushed = min(sensed.base_velocity[i, 0] + 2.0 * reach_rate, 0.0)
     turning = sensed.base_velocity[i, 1] * pushed
-    return -residual[i, 0], turning - residual[i, 1], -residual[i, 2]
+    return -beside[0], turning - beside[1], -beside[2]

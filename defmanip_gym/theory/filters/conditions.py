@@ -60,21 +60,25 @@ class FilterConditions:
 class PayloadIntervals:
     """Constant but unknown factors (lowest, highest) on the parameters of the believed beam.
 
-    Any damping is covered, none included: V never counts on it.
+    Filters that know V only cover any damping, none included. Those that roll out the beam count on
+    its own, and on what ``damping`` makes of it.
 
     Attributes:
         mass: on its mass.
         length: on its length.
         stiffness: on the stiffness at its root and in its joints.
+        damping: on the damping at its root and in its joints; the lower one may be 0.
     """
 
     mass: tuple[float, float] = (1.0, 1.0)
     length: tuple[float, float] = (1.0, 1.0)
     stiffness: tuple[float, float] = (1.0, 1.0)
+    damping: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            settle(self, name, require_range, _SMALLEST_FACTOR, _LARGEST_FACTOR)
+            smallest = 0.0 if name == "damping" else _SMALLEST_FACTOR
+            settle(self, name, require_range, smallest, _LARGEST_FACTOR)
             low, high = getattr(self, name)
             if not low <= 1.0 <= high:
                 raise ParameterError(
@@ -106,6 +110,24 @@ class PayloadIntervals:
             )
         )
         return tuple(dict.fromkeys((beam, *made)))
+
+    def dampings(self, beam: BeamParams) -> tuple[tuple[float, float], ...]:
+        """Return dampings of root and joints, N·m·s/rad, at the interval's ends; the own first."""
+        ends = tuple(sorted({*self.damping}))
+        joints = ends if beam.segment_count > 1 else (1.0,)
+        made = (
+            (root * beam.damping, joint * beam.joint_damping)
+            for root, joint in product(ends, joints)
+        )
+        return tuple(dict.fromkeys(((beam.damping, beam.joint_damping), *made)))
+
+    def cover_damping(self, believed: BeamParams, carried: BeamParams) -> bool:
+        """Whether a beam is damped as the believed one is within the interval."""
+        low, high = self.damping
+        pairs = [(believed.damping, carried.damping)]
+        if believed.segment_count > 1:
+            pairs.append((believed.joint_damping, carried.joint_damping))
+        return all(low * own - _ROUNDING <= true <= high * own + _ROUNDING for own, true in pairs)
 
     def cover(self, believed: BeamParams, carried: BeamParams) -> bool:
         """Whether a beam is the believed one within the intervals."""

@@ -123,7 +123,7 @@ def test_more_room_for_errors_lowers_the_level():
             FilterConditions(forward_error_m_s2=1.0),
         )
     ]
-    assert shares == sorted(shares, reverse=True) and shares[0] > 0.98
+    assert shares == sorted(shares, reverse=True) and shares[0] > 0.97
 
 
 def test_any_damping_is_covered_and_other_beams_within_the_intervals_only():
@@ -144,7 +144,7 @@ def test_over_intervals_the_storage_of_every_beam_stays_below_its_pass():
     swing, rate = at_the_level(wide, 1.0)
     rng = np.random.default_rng(3)
     for _ in range(20):
-        mass, length, stiffness = (rng.uniform(*ends) for ends in vars(intervals).values())
+        mass, length, stiffness, _ = (rng.uniform(*ends) for ends in vars(intervals).values())
         carried = replace(
             beam,
             mass_kg=mass * beam.mass_kg,
