@@ -11,19 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 from defmanip_gym.errors import ObjectFileError
+from defmanip_gym.objects.internal_forces import CARRIAGE, YAW, InternalForces
 from defmanip_gym.params import LARGEST_SIGMA_RAD
-from defmanip_gym.plant.object_copy import HELD_SITE
 from defmanip_gym.plant.object_file import ObjectFile, read_object_file
-from defmanip_gym.plant.rig_model import CARRIAGE_JOINTS, RigModel
+from defmanip_gym.plant.rig_model import RigModel
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
-_CARRIAGE = len(CARRIAGE_JOINTS)
-_FORWARD, _LEFT, _UP, _YAW = range(4)
+_FORWARD, _LEFT, _UP = range(3)
 _STEP = 1e-5  # rad, m: truncation 1e-10, rounding 1e-11 of the forces
 _NEWTON_STEPS = 50
 _FORCE_TOLERANCE = 1e-10  # of the object's weight, N or N·m per m
@@ -50,7 +48,7 @@ def object_from_mjcf(path: str | Path, *, grasp_site: str) -> LinearizedObject:
 def mjcf_object(path: str | Path, *, grasp_site: str) -> MjcfObject:
     """Return the object in a model file, linearized and ready to be hung on a rig."""
     object_file = read_object_file(path, grasp_site=grasp_site)
-    forces = _InternalForces(object_file)
+    forces = InternalForces(object_file)
     equilibrium = _equilibrium(object_file, forces)
     linear = _linearized(object_file, forces, equilibrium)
     _require_apparent_inertia(object_file, linear)
@@ -79,59 +77,9 @@ class MjcfObject:
         )
 
 
-class _InternalForces:
-    """Q(z2, ż2, z̈1, u2) by inverse dynamics, and its parts."""
-
-    def __init__(self, object_file: ObjectFile) -> None:
-        self.model = object_file.rig_model(is_heavy=False)
-        self.data = mujoco.MjData(self.model)
-        self.count = self.model.nv - _CARRIAGE
-
-    def __call__(
-        self,
-        z2: Array,
-        rate: Array | None = None,
-        *,
-        acceleration_m_s2: Array | None = None,
-        yaw_rate_rad_s: float = 0.0,
-    ) -> Array:
-        """Return the forces (N,) that hold z̈2 = 0."""
-        data = self.data
-        data.qpos[_CARRIAGE:] = z2
-        data.qvel[:] = 0.0
-        data.qacc[:] = 0.0
-        data.qvel[_YAW] = yaw_rate_rad_s
-        if acceleration_m_s2 is not None:
-            data.qacc[:3] = acceleration_m_s2
-        if rate is not None:
-            data.qvel[_CARRIAGE:] = rate
-        mujoco.mj_inverse(self.model, data)
-        return data.qfrc_inverse[_CARRIAGE:].copy()
-
-    def elastic(self, z2: Array) -> Array:
-        """Return the springs' share of Q, (N,)."""
-        self(z2)
-        return -self.data.qfrc_spring[_CARRIAGE:].copy()
-
-    def mass_matrix(self, z2: Array) -> Array:
-        """Return the mass matrix for (z̈1, u̇2, z̈2), (4 + N, 4 + N)."""
-        self(z2)
-        matrix = np.zeros((self.model.nv, self.model.nv))
-        mujoco.mj_fullM(self.model, self.data, matrix)
-        return matrix
-
-    def grasp_motion(self, z2: Array) -> Array:
-        """Return how the grasp site moves against the carriage with z2, (3, N)."""
-        self(z2)
-        jacobian = np.zeros((3, self.model.nv))
-        site = self.model.site(HELD_SITE).id
-        mujoco.mj_jacSite(self.model, self.data, jacobian, None, site)
-        return jacobian[:, _CARRIAGE:]
-
-
-def _equilibrium(object_file: ObjectFile, forces: _InternalForces) -> Array:
+def _equilibrium(object_file: ObjectFile, forces: InternalForces) -> Array:
     """Return z2* of Eq. (12) by Newton's method from the file's own configuration."""
-    z2 = forces.model.qpos0[_CARRIAGE:].copy()
+    z2 = forces.model.qpos0[CARRIAGE:].copy()
     tolerance = _FORCE_TOLERANCE * object_file.mass_kg * 10.0
     residual = forces(z2)
     for _ in range(_NEWTON_STEPS):
@@ -152,7 +100,7 @@ def _equilibrium(object_file: ObjectFile, forces: _InternalForces) -> Array:
     )
 
 
-def _stable(object_file: ObjectFile, forces: _InternalForces, z2: Array) -> Array:
+def _stable(object_file: ObjectFile, forces: InternalForces, z2: Array) -> Array:
     stiffness = _slope(forces, z2)
     eigenvalues = np.linalg.eigvalsh((stiffness + stiffness.T) / 2)
     smallest = eigenvalues[0]
@@ -168,7 +116,7 @@ def _stable(object_file: ObjectFile, forces: _InternalForces, z2: Array) -> Arra
 
 
 def _linearized(
-    object_file: ObjectFile, forces: _InternalForces, equilibrium: Array
+    object_file: ObjectFile, forces: InternalForces, equilibrium: Array
 ) -> LinearizedObject:
     motion = forces.grasp_motion(equilibrium)
     if np.abs(motion).max() > _NEGLIGIBLE:
@@ -192,7 +140,7 @@ def _linearized(
         return forces(z2) - forces(z2, yaw_rate_rad_s=1.0)
 
     mass = forces.mass_matrix(equilibrium)
-    inner = slice(_CARRIAGE, None)
+    inner = slice(CARRIAGE, None)
     elastic = _slope(forces.elastic, equilibrium)
     return LinearizedObject(
         m_o11=mass[:3, :3].copy(),
@@ -212,13 +160,13 @@ def _linearized(
     )
 
 
-def _acceleration_stiffness(forces: _InternalForces, z2: Array, axis: int) -> Array:
+def _acceleration_stiffness(forces: InternalForces, z2: Array, axis: int) -> Array:
     """Return ∂Q/∂z2 per m/s² of grasp acceleration along an axis, (N, N)."""
     unit = np.eye(3)[axis]  # Q is linear in it, so any size is exact
     return _slope(lambda each: forces(each, acceleration_m_s2=unit) - forces(each), z2)
 
 
-def _is_excited_by_yaw(forces: _InternalForces, equilibrium: Array, mass: Array) -> bool:
+def _is_excited_by_yaw(forces: InternalForces, equilibrium: Array, mass: Array) -> bool:
     """Whether u2² pushes at z2*, u2 couples to ż2, or u̇2 to z̈2, there or beside z2*.
 
     u̇2 is not bounded by a certificate, so its torque must not grow with z2 either.
@@ -230,9 +178,9 @@ def _is_excited_by_yaw(forces: _InternalForces, equilibrium: Array, mass: Array)
     at_rest = forces(equilibrium, yaw_rate_rad_s=1.0) - forces(equilibrium)
     rest = np.zeros(forces.count)
     gyroscopic = _slope(coriolis, rest) - _slope(lambda rate: forces(equilibrium, rate), rest)
-    yaw_coupling = _slope(lambda z2: forces.mass_matrix(z2)[_YAW, _CARRIAGE:], equilibrium)
-    inertia = np.abs(mass[_CARRIAGE:, _CARRIAGE:]).max()
-    couplings = (at_rest, gyroscopic, mass[_YAW, _CARRIAGE:], yaw_coupling)
+    yaw_coupling = _slope(lambda z2: forces.mass_matrix(z2)[YAW, CARRIAGE:], equilibrium)
+    inertia = np.abs(mass[CARRIAGE:, CARRIAGE:]).max()
+    couplings = (at_rest, gyroscopic, mass[YAW, CARRIAGE:], yaw_coupling)
     return max(float(np.abs(coupling).max()) for coupling in couplings) > 1e-6 * inertia
 
 

@@ -22,7 +22,8 @@ III, beyond        ``filters``: ``storage``, Lemma III.1's V as a barrier; ``saf
                    ``conditions``, ``storage_filter``: the family and its closed form, built of
                    ``sensed``, ``period_mean``, ``limits``, ``barrier``, ``decision``,
                    ``foresight``, ``batches``, ``swing_estimate``, ``reserves``;
-                   ``nu_max_filter``; ``family``
+                   ``nu_max_filter``; ``backup``, ``backup_decision``,
+                   ``backup_filter``: rollouts of the nominal model; ``family``
 IV.A, V            ``control``: ``velocity_field`` IV.A; ``control_laws`` (20), (27), (29);
                    ``continuous_loop`` (30)–(34); ``stability``, ``effective_damping``: what
                    sampling and wrong parameters make of it

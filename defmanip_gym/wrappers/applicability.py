@@ -141,7 +141,7 @@ class Applicability:
             watched &= ~idle
         if not watched.any():
             return
-        broken, reason_of = self._terms.broken(surprise, observation)
+        broken, reason_of = self._terms.broken(surprise, observation, memory)
         for i in np.flatnonzero(broken & watched).tolist():
             self.reasons[i], self._is_outside[i], self._applies[i] = reason_of(i), False, False
         if self._is_outside.any():

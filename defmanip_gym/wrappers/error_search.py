@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ class PeriodErrors(NamedTuple):
         counted: where what happened before is known to the filter, (n,).
         before: observations at its beginning, (n, size).
         after: and at its end.
+        memory: of the filter, which has concluded the period.
     """
 
     surprise: Array
@@ -54,6 +55,7 @@ class PeriodErrors(NamedTuple):
     counted: BoolArray
     before: Array
     after: Array
+    memory: Any
 
 
 def require_affordable(config: TransportConfig) -> None:
@@ -128,7 +130,7 @@ class ErrorSearch:
             surprise = np.abs(self._filter.conclude(after, self._memory))
             counted = np.ones(self._count, dtype=bool) if period >= self._unknown else ~self._moving
             yaw_rate = self._layout.part(after, "base_velocity")[:, 1]
-            yield PeriodErrors(surprise, stray, yaw_rate, counted, before, after)
+            yield PeriodErrors(surprise, stray, yaw_rate, counted, before, after, self._memory)
             before = after
 
     def _wild_commands(self) -> Array:

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.workspace import in_workspace, workspace_of
+from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamRanges
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.wrappers.error_search import ErrorSearch, require_affordable
@@ -18,6 +20,7 @@ Array = NDArray[np.float64]
 
 _COUNT, _RESTING = 1024, 128  # motions searched, and those of them that start from rest
 _PERIODS = 12  # in which wild commands excite what they can
+_FOUND = 7  # numbers: three changes, three offsets, the storage
 _MARGIN = 1.1  # on what the search finds
 
 
@@ -26,11 +29,13 @@ class FilterErrors:
     """The largest errors found, with a margin of a tenth; see ``FilterConditions``.
 
     Attributes:
-        acceleration_m_s2: forward, to the side and upwards.
+        acceleration_m_s2: changes of the offset, forward, to the side and upwards.
+        offset_m_s2: the offset itself.
         storage: as a share of V_σ.
     """
 
-    acceleration_m_s2: tuple[float, float, float]
+    acceleration_m_s2: tuple[float, ...]
+    offset_m_s2: tuple[float, ...]
     storage: float
 
 
@@ -46,18 +51,20 @@ def filter_errors(config: TransportConfig, safety_filter: StorageFilter) -> Filt
         CertificateError: the search would take too long.
     """
     require_affordable(config)
-    accelerations, storage = np.zeros(3), 0.0
+    errors = np.zeros(_FOUND)
     for beam in dict.fromkeys(config.beam_ranges.extremes(config.beam)):
         carried = replace(
             config, beam=beam, nominal_beam=config.believed_beam, beam_ranges=BeamRanges()
         )
-        found, stored = _errors(carried, safety_filter)
-        accelerations, storage = np.maximum(accelerations, found), max(storage, stored)
-    forward, left, up = (_MARGIN * accelerations).tolist()
-    return FilterErrors(acceleration_m_s2=(forward, left, up), storage=_MARGIN * storage)
+        errors = np.maximum(errors, _errors(carried, safety_filter))
+    found = (_MARGIN * errors).tolist()
+    return FilterErrors(
+        acceleration_m_s2=tuple(found[:3]), offset_m_s2=tuple(found[3:6]), storage=found[6]
+    )
 
 
-def _errors(config: TransportConfig, safety_filter: StorageFilter) -> tuple[Array, float]:
+def _errors(config: TransportConfig, safety_filter: StorageFilter) -> Array:
+    """Return changes of the offset, offsets and errors of the storage, (7,), as found."""
     rng = np.random.default_rng(0)
     noiseless = safety_filter.with_conditions(swing_noise_rad=0.0)
     carried = noiseless.for_beam(config.beam)
@@ -70,9 +77,17 @@ def _errors(config: TransportConfig, safety_filter: StorageFilter) -> tuple[Arra
         periods=_PERIODS,
         delay_periods=safety_filter.conditions.delay_periods,
     )
-    accelerations, storage = np.zeros(3), 0.0
+    layout, space = ObservationLayout(config.beam.segment_count), workspace_of(config)
+    errors, running = np.zeros(_FOUND), np.ones(_COUNT, dtype=bool)
     for period in search.periods():
-        accelerations = np.maximum(accelerations, period.surprise[period.counted].max(axis=0))
+        pitch = layout.part(period.after, "joints").cumsum(axis=1)
+        # where the arm has left its workspace the episode is over
+        running &= in_workspace(space.center_x_m, space.center_y_m, pitch[:, 0], pitch[:, 1], space)
+        counted = period.counted & running
+        if not counted.any():
+            break
         stored = carried.storage_errors(period.before, period.after)
-        storage = max(storage, float(stored[period.counted].max()))
-    return accelerations, storage
+        offsets = np.abs(period.memory.residual)
+        found = np.concatenate((period.surprise, offsets, stored[:, None]), axis=1)
+        errors = np.maximum(errors, found[counted].max(axis=0))
+    return errors

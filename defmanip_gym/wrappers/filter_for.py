@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.validation import require_instance
-from defmanip_gym.wrappers.filter_errors import filter_errors
+from defmanip_gym.wrappers.filter_errors import FilterErrors, filter_errors
 
 _ROUNDS = 4
 _SPARE = 1.05  # another level makes other errors
+_HOPELESS_M_S2 = 100.0  # the search has left what robots do
 
 
 def filter_for(
@@ -51,28 +50,33 @@ def filter_for(
     )
     for _ in range(_ROUNDS):
         found, given = filter_errors(config, made), made.conditions
-        forward, lateral, vertical = found.acceleration_m_s2
-        needed = replace(
-            given,
-            forward_error_m_s2=max(given.forward_error_m_s2, _SPARE * forward),
-            lateral_error_m_s2=max(given.lateral_error_m_s2, _SPARE * lateral),
-            vertical_error_m_s2=max(given.vertical_error_m_s2, _SPARE * vertical),
-            storage_error=max(given.storage_error, _SPARE * found.storage),
-        )
-        is_enough = (
-            max(forward - given.forward_error_m_s2, lateral - given.lateral_error_m_s2) <= 0
-            and vertical <= given.vertical_error_m_s2
-            and found.storage <= given.storage_error
-        )
-        if is_enough:
+        if max(found.acceleration_m_s2) > _HOPELESS_M_S2:
+            break
+        needed = _provided(found)
+        if all(size <= getattr(given, name) for name, size in needed.items()):
             return made
-        made = made.with_conditions(**vars(needed))
+        room = {name: max(getattr(given, name), _SPARE * size) for name, size in needed.items()}
+        made = made.with_conditions(**room)
     raise CertificateError(
         "errors of the environment",
         found,
         "errors that do not grow with the room that is made for them",
-        "Use a shorter control period, a smaller max_acceleration_m_s2 or a better nominal beam.",
+        "Use a shorter control period or delay, a smaller max_acceleration_m_s2 or a better "
+        "nominal beam.",
     )
+
+
+def _provided(found: FilterErrors) -> dict[str, float]:
+    """Return the fields of ``FilterConditions`` that errors need."""
+    forward, lateral, vertical = found.acceleration_m_s2
+    return {
+        "forward_error_m_s2": forward,
+        "lateral_error_m_s2": lateral,
+        "vertical_error_m_s2": vertical,
+        "forward_offset_m_s2": found.offset_m_s2[0],
+        "vertical_offset_m_s2": found.offset_m_s2[2],
+        "storage_error": found.storage,
+    }
 
 
 def _drawn_around(config: TransportConfig, beam: BeamParams) -> PayloadIntervals:

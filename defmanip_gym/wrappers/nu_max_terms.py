@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,9 @@ class NuMaxTerms:
             )
         return ""
 
-    def broken(self, surprise: Array, observation: Array) -> tuple[BoolArray, Callable[[int], str]]:
+    def broken(
+        self, surprise: Array, observation: Array, memory: Any
+    ) -> tuple[BoolArray, Callable[[int], str]]:
         """Return where a period broke the terms, (n,), and what to say of an episode."""
         stray = realization_errors(self._config, self._certificate).stray_m_s
         room = self._budget.needed(np.abs(surprise[:, 0]), np.abs(surprise[:, 2]), stray)

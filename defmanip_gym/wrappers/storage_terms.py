@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.theory.filters.storage_filter import StorageFilter, StorageMemory
 from defmanip_gym.wrappers.filter_errors import filter_errors
 
 Array = NDArray[np.float64]
@@ -60,14 +60,17 @@ class StorageTerms:
                     f"{getattr(known, name):g}"
                 )
         errors = filter_errors(config, self._filter)
-        for axis, found, provided in zip(
-            _AXES, errors.acceleration_m_s2, self._filter.errors_m_s2, strict=True
+        for name, found, provided in (
+            ("errors", errors.acceleration_m_s2, self._filter.errors_m_s2),
+            ("offsets", errors.offset_m_s2, self._filter.offsets_m_s2),
         ):
-            if found > provided:
-                return (
-                    f"robot, beam, periods and beliefs of this environment make {axis} errors of "
-                    f"up to {found:.3g} m/s²; the filter provides for {provided:.3g}"
-                )
+            for axis in range(3):
+                if found[axis] > provided[axis]:
+                    return (
+                        f"robot, beam, periods and beliefs of this environment make {_AXES[axis]} "
+                        f"{name} of up to {found[axis]:.3g} m/s²; the filter provides for "
+                        f"{provided[axis]:.3g}"
+                    )
         if errors.storage > conditions.storage_error:
             return (
                 f"a control period may bring {errors.storage:.3g} of V_σ more than is foreseen; "
@@ -79,15 +82,20 @@ class StorageTerms:
         """Return nothing: every start is provided for, if not inside then later."""
         return ""
 
-    def broken(self, surprise: Array, observation: Array) -> tuple[BoolArray, Callable[[int], str]]:
+    def broken(
+        self, surprise: Array, observation: Array, memory: StorageMemory
+    ) -> tuple[BoolArray, Callable[[int], str]]:
         """Return where a period broke the terms, (n,), and what to say of an episode."""
-        sizes, provided = np.abs(surprise), np.array(self._filter.errors_m_s2)
+        sizes = np.abs(np.concatenate((surprise, memory.residual), axis=1))
+        provided = np.array((*self._filter.errors_m_s2, *self._filter.offsets_m_s2))
 
         def reason(i: int) -> str:
-            axis = int(np.argmax(sizes[i] / np.maximum(provided, 1e-12)))
+            worst = int(np.argmax(sizes[i] / np.maximum(provided, 1e-12)))
+            what = "changed by" if worst < len(_AXES) else "was off by"
             return (
-                f"in a control period the {_AXES[axis]} acceleration was {sizes[i, axis]:.3g} m/s² "
-                f"beside what was foreseen; the filter provides for {provided[axis]:.3g}"
+                f"in a control period the {_AXES[worst % len(_AXES)]} acceleration {what} "
+                f"{sizes[i, worst]:.3g} m/s² beside what was foreseen; the filter provides for "
+                f"{provided[worst]:.3g}"
             )
 
         broken = np.logical_not((sizes <= provided).all(axis=1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ class Terms(Protocol):
         """Return why the start of episode i, in observations (n, size), is not provided for."""
         ...
 
-    def broken(self, surprise: Array, observation: Array) -> tuple[BoolArray, Callable[[int], str]]:
+    def broken(
+        self, surprise: Array, observation: Array, memory: Any
+    ) -> tuple[BoolArray, Callable[[int], str]]:
         """Return where a period broke the terms, (n,), and what to say of an episode."""
         ...

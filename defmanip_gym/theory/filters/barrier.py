@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ class StorageLevels(NamedTuple):
     Attributes:
         model: of the beams that may be carried.
         levels: up to which B may rise, (C,) J.
+        momenta: s_f at its largest within V ≤ V_σ, (C,) kg·m/s.
         errors: of the period's mean acceleration about what is foreseen, (3,) m/s².
         residual: of B itself after a period, as a share of V_σ.
         limits: of the robot.
@@ -35,6 +37,7 @@ class StorageLevels(NamedTuple):
 
     model: StorageModel
     levels: Array
+    momenta: Array
     errors: Array
     residual: float
     limits: RobotLimits
@@ -66,6 +69,9 @@ def excess_after(
 ) -> float:
     """Return the largest (B after a period − level) / V_σ over the beams, errors included.
 
+    Speed beyond the limit counts as if it were stored, too: what loses it may push the object all
+    the while, and the limiter would not let it be countered.
+
     Args:
         setup: levels, errors and robot.
         command: that takes effect as it is, m/s².
@@ -96,6 +102,12 @@ def excess_after(
     yaw_rate = sensed.base_velocity[i, 1]
     later_yaw_rate = yaw_rate + period_s * (turning + residual[i, 1] / reach)
     middle_yaw_rate = 0.5 * (yaw_rate + later_yaw_rate)
+    fast = speed_excess(
+        limits.max_speed_m_s,
+        sensed.velocity_b[i, 0] + period_s * forward,
+        sensed.velocity_b[i, 1] + period_s * (left + residual[i, 1]),
+        sensed.velocity_b[i, 2] + period_s * upward,
+    )
     for j in range(len(room.swing)):
         room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
     largest = -np.inf
@@ -116,19 +128,13 @@ def excess_after(
         after = storage_at(
             model, c, room.storage.swing, room.storage.swing_rate, later_yaw_rate, room.storage
         )
+        after += setup.momenta[c] * fast
         after += period_s * (
             abs(s_forward) * setup.errors[0]
             + abs(leftward) * setup.errors[1]
             + abs(s_upward) * setup.errors[2]
         )
-        for j in range(len(room.swing)):
-            slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.storage.sine[j])
-            for k in range(len(room.swing)):
-                slope += abs(model.stiffness[c, j, k] * room.storage.swing[k])
-                curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
-                after += 0.5 * curvature * uncertainty[i, j]
-            curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
-            after += (slope + 0.5 * curvature) * uncertainty[i, j]
+        after += uncertain_storage(model, c, uncertainty, i, room.storage)
         excess = (after - setup.levels[c]) / model.passes[c] + setup.residual
         if excess > largest:
             largest = excess
@@ -140,8 +146,41 @@ def excess_after(
 
 
 @compilable
-def coasting(setup: StorageLevels, sensed: Sensed, i: int) -> tuple[float, float, float]:
-    """Return the command under which B does not rise: none, or what keeps |u2| from rising.
+def uncertain_storage(
+    model: StorageModel, c: int, uncertainty: Array, i: int, room: StorageRoom
+) -> float:
+    """Return how much more than in ``room`` may be stored, J, if angles are uncertain.
+
+    Args:
+        model: of the beams.
+        c: which of them.
+        uncertainty: of the swing, (n, N) rad.
+        i: which state.
+        room: what ``storage_at`` left of that state's swing, which is in ``room.swing``.
+    """
+    more = 0.0
+    for j in range(len(room.swing)):
+        slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.sine[j])
+        for k in range(len(room.swing)):
+            slope += abs(model.stiffness[c, j, k] * room.swing[k])
+            curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
+            more += 0.5 * curvature * uncertainty[i, j]
+        curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
+        more += (slope + 0.5 * curvature) * uncertainty[i, j]
+    return more
+
+
+@compilable
+def speed_excess(limit: float, forward: float, left: float, up: float) -> float:
+    """Return by how much a velocity is faster than a limit, m/s."""
+    return max(sqrt(forward**2 + left**2 + up**2) - limit, 0.0)
+
+
+@compilable
+def coasting(
+    setup: StorageLevels, sensed: Sensed, i: int, beside: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return the command under which B does not rise: what makes up for acceleration beside it.
 
     A base that is pushed backwards turns away by itself; holding its yaw rate slows the grasp.
     """
@@ -149,4 +188,5 @@ def coasting(setup: StorageLevels, sensed: Sensed, i: int) -> tuple[float, float
     rho_1, rho_2, _, _ = reach_and_height_slopes(arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
     reach_rate = rho_1 * sensed.pitch_rate[i, 0] + rho_2 * sensed.pitch_rate[i, 1]
     pushed = min(sensed.base_velocity[i, 0] + 2.0 * reach_rate, 0.0)
-    return 0.0, sensed.base_velocity[i, 1] * pushed, 0.0
+    turning = sensed.base_velocity[i, 1] * pushed
+    return -beside[0], turning - beside[1], -beside[2]

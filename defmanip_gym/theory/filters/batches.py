@@ -5,7 +5,7 @@ from __future__ import annotations
 from defmanip_gym.compiled import compiled
 from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.chain import Array
-from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
+from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels, speed_excess
 from defmanip_gym.theory.filters.decision import decide
 from defmanip_gym.theory.filters.foresight import advance
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
@@ -88,6 +88,10 @@ def store_all(setup: StorageLevels, sensed: Sensed, room: DecisionRoom, shares: 
     for i in range(len(shares)):
         for j in range(len(room.swing)):
             room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
+        velocity = sensed.velocity_b
+        fast = speed_excess(
+            setup.limits.max_speed_m_s, velocity[i, 0], velocity[i, 1], velocity[i, 2]
+        )
         shares[i] = 0.0
         for c in range(len(setup.levels)):
             stored = storage_at(
@@ -98,6 +102,7 @@ def store_all(setup: StorageLevels, sensed: Sensed, room: DecisionRoom, shares: 
                 sensed.base_velocity[i, 1],
                 room.storage,
             )
+            stored += setup.momenta[c] * fast
             shares[i] = max(shares[i], stored / setup.levels[c])
 
 

@@ -19,13 +19,15 @@ _ROUNDING = 1e-9
 class FilterConditions:
     """Errors, noise and delay that a filter makes room for.
 
-    The errors are those of a period's mean acceleration about what the filter foresees: the
-    command, what sampling makes of it, and what came on top of that in the period before.
+    A period's mean acceleration is what sampling makes of the command, and an offset. The filter
+    counts on the offset of the period before; errors are its changes.
 
     Attributes:
         forward_error_m_s2: forward.
         lateral_error_m_s2: to the side.
         vertical_error_m_s2: upwards.
+        forward_offset_m_s2: how far the forward offset may be from zero.
+        vertical_offset_m_s2: and the vertical one.
         storage_error: of the storage after a period with just that acceleration, as a share of V_σ.
         swing_noise_rad: standard deviation of the measured swing angles.
         delay_periods: control periods until a command takes effect.
@@ -34,12 +36,20 @@ class FilterConditions:
     forward_error_m_s2: float = 0.17
     lateral_error_m_s2: float = 0.17
     vertical_error_m_s2: float = 0.15
+    forward_offset_m_s2: float = 0.2
+    vertical_offset_m_s2: float = 0.2
     storage_error: float = 0.0015
     swing_noise_rad: float = 0.0
     delay_periods: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("forward_error_m_s2", "lateral_error_m_s2", "vertical_error_m_s2"):
+        for name in (
+            "forward_error_m_s2",
+            "lateral_error_m_s2",
+            "vertical_error_m_s2",
+            "forward_offset_m_s2",
+            "vertical_offset_m_s2",
+        ):
             settle(self, name, require_number, 0.0, _LARGEST_ERROR, "m/s²")
         settle(self, "storage_error", require_number, 0.0, 1.0)
         settle(self, "swing_noise_rad", require_number, 0.0, 1.0, "rad")
@@ -50,21 +60,25 @@ class FilterConditions:
 class PayloadIntervals:
     """Constant but unknown factors (lowest, highest) on the parameters of the believed beam.
 
-    Any damping is covered, none included: V never counts on it.
+    Filters that know V only cover any damping, none included. Those that roll out the beam count on
+    its own, and on what ``damping`` makes of it.
 
     Attributes:
         mass: on its mass.
         length: on its length.
         stiffness: on the stiffness at its root and in its joints.
+        damping: on the damping at its root and in its joints; the lower one may be 0.
     """
 
     mass: tuple[float, float] = (1.0, 1.0)
     length: tuple[float, float] = (1.0, 1.0)
     stiffness: tuple[float, float] = (1.0, 1.0)
+    damping: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            settle(self, name, require_range, _SMALLEST_FACTOR, _LARGEST_FACTOR)
+            smallest = 0.0 if name == "damping" else _SMALLEST_FACTOR
+            settle(self, name, require_range, smallest, _LARGEST_FACTOR)
             low, high = getattr(self, name)
             if not low <= 1.0 <= high:
                 raise ParameterError(
@@ -96,6 +110,24 @@ class PayloadIntervals:
             )
         )
         return tuple(dict.fromkeys((beam, *made)))
+
+    def dampings(self, beam: BeamParams) -> tuple[tuple[float, float], ...]:
+        """Return dampings of root and joints, N·m·s/rad, at the interval's ends; the own first."""
+        ends = tuple(sorted({*self.damping}))
+        joints = ends if beam.segment_count > 1 else (1.0,)
+        made = (
+            (root * beam.damping, joint * beam.joint_damping)
+            for root, joint in product(ends, joints)
+        )
+        return tuple(dict.fromkeys(((beam.damping, beam.joint_damping), *made)))
+
+    def cover_damping(self, believed: BeamParams, carried: BeamParams) -> bool:
+        """Whether a beam is damped as the believed one is within the interval."""
+        low, high = self.damping
+        pairs = [(believed.damping, carried.damping)]
+        if believed.segment_count > 1:
+            pairs.append((believed.joint_damping, carried.joint_damping))
+        return all(low * own - _ROUNDING <= true <= high * own + _ROUNDING for own, true in pairs)
 
     def cover(self, believed: BeamParams, carried: BeamParams) -> bool:
         """Whether a beam is the believed one within the intervals."""

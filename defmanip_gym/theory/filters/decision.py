@@ -90,20 +90,21 @@ def decide(
         return -excess
     largest = limits.max_acceleration_m_s2
     low, high = (forward_low, -largest, up_low), (forward_high, largest, up_high)
-    moved, excess = _within(
+    moved, excess = within(
         setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
     )
     if excess > 0.0:  # rather out of the arm's range than beyond the level
         low, high = (forward_low, -largest, -largest), (forward_high, largest, largest)
-        moved, excess = _within(
+        moved, excess = within(
             setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
         )
-    allowed[i, 0], allowed[i, 1], allowed[i, 2] = moved[0], moved[1], moved[2]
-    return -excess
+    for axis in range(3):  # zero where nothing can be foreseen, of an arm beyond its limits
+        allowed[i, axis] = moved[axis] if abs(moved[axis]) <= largest else 0.0
+    return -excess if excess < np.inf else -np.inf
 
 
 @compilable
-def _within(
+def within(
     setup: StorageLevels,
     wished: tuple[float, float, float],
     sensed: Sensed,
@@ -198,7 +199,8 @@ def _safest(
 ) -> tuple[tuple[float, float, float], float]:
     """Return the command that leaves B smallest, of coasting and some dampings, and its excess."""
     limits = setup.limits
-    coast = clipped(coasting(setup, sensed, i), low, high)
+    beside = residual[i, 0], residual[i, 1], residual[i, 2]
+    coast = clipped(coasting(setup, sensed, i, beside), low, high)
     best = coast
     least = excess_after(setup, coast, sensed, i, residual, uncertainty, room)
     norm = np.sqrt(room.gradient[0] ** 2 + room.gradient[1] ** 2 + room.gradient[2] ** 2)

@@ -10,6 +10,7 @@ from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.redundancy import shared_acceleration
 from defmanip_gym.theory.dynamics.robot_model import reach_and_height
 from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
+from defmanip_gym.theory.filters.limits import RobotLimits
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import swing_step
@@ -34,13 +35,46 @@ def advance(
         i: which of them.
         room: for intermediate results.
     """
-    limits = setup.limits
+    beside = residual[i, 0], residual[i, 1], residual[i, 2]
+    command = commands[i, 0], commands[i, 1], commands[i, 2]
+    forward, up, yaw_rate = advance_robot(setup.limits, command, beside, sensed, i)
+    for j in range(len(room.swing)):
+        room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
+    period_s = setup.limits.period_s
+    swing_step(
+        setup.model, 0, room.swing, room.swing_rate, forward, up, yaw_rate, period_s, room.storage
+    )
+    for j in range(len(room.swing)):
+        sensed.swing[i, j] = room.storage.swing[j]
+        sensed.swing_rate[i, j] = room.storage.swing_rate[j]
+
+
+@compilable
+def advance_robot(
+    limits: RobotLimits,
+    command: tuple[float, float, float],
+    beside: tuple[float, float, float],
+    sensed: Sensed,
+    i: int,
+) -> tuple[float, float, float]:
+    """Move robot and grasp of a state on by a period, in place; return what that does to its beam.
+
+    Args:
+        limits: of the robot.
+        command: before the speed limiter, m/s².
+        beside: acceleration beside what is foreseen, m/s².
+        sensed: the states; the swing stays as it is.
+        i: which of them.
+
+    Returns:
+        Mean acceleration forward and upward, m/s², and the yaw rate in the period's middle, rad/s.
+    """
     period_s, half = limits.period_s, 0.5 * limits.period_s
     velocity, base, rate = sensed.velocity_b, sensed.base_velocity, sensed.pitch_rate
     w = limited_acceleration(
-        commands[i, 0],
-        commands[i, 1],
-        commands[i, 2],
+        command[0],
+        command[1],
+        command[2],
         velocity[i, 0],
         velocity[i, 1],
         velocity[i, 2],
@@ -76,17 +110,9 @@ def advance(
         base[i, 1],
     )
     reach, _ = reach_and_height(limits.arm, upper, fore)
-    forward, left, up = forward + residual[i, 0], left + residual[i, 1], up + residual[i, 2]
-    turning += residual[i, 1] / reach
+    forward, left, up = forward + beside[0], left + beside[1], up + beside[2]
+    turning += beside[1] / reach
     yaw_rate = base[i, 1] + half * turning
-    for j in range(len(room.swing)):
-        room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
-    swing_step(
-        setup.model, 0, room.swing, room.swing_rate, forward, up, yaw_rate, period_s, room.storage
-    )
-    for j in range(len(room.swing)):
-        sensed.swing[i, j] = room.storage.swing[j]
-        sensed.swing_rate[i, j] = room.storage.swing_rate[j]
     # the acceleration is in the axes of the period's middle
     cosine, sine = cos(half * yaw_rate), sin(half * yaw_rate)
     ahead = cosine * velocity[i, 0] + sine * velocity[i, 1] + period_s * forward
@@ -94,10 +120,11 @@ def advance(
     velocity[i, 0] = cosine * ahead + sine * aside
     velocity[i, 1] = cosine * aside - sine * ahead
     velocity[i, 2] += period_s * up
-    base[i, 0] += period_s * (driving + residual[i, 0])
+    base[i, 0] += period_s * (driving + beside[0])
     base[i, 1] += period_s * turning
     sensed.heading[i] += period_s * yaw_rate
     sensed.pitch[i, 0] += period_s * (rate[i, 0] + half * upper_dot)
     sensed.pitch[i, 1] += period_s * (rate[i, 1] + half * fore_dot)
     rate[i, 0] += period_s * upper_dot
     rate[i, 1] += period_s * fore_dot
+    return forward, up, yaw_rate

@@ -1,4 +1,4 @@
-"""What of V_σ sampling, errors, noise and delay cost: docs/derivations.md, section 14."""
+"""What of V_σ sampling, errors, noise and delay cost: docs/derivations.md, section 18."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.conditions import FilterConditions
 from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.payload.object_model import HangingBeam
-
-_PERIODS_AT_THE_LIMIT = 4.0
 
 
 def hanging_modes(beam: BeamParams) -> tuple[Array, Array]:
@@ -50,24 +48,33 @@ def reserved_shares(
         task: limits and control period.
     """
     period_s, passes = task.control_period_s, model.passes
-    yielding = _yielding_mass(model)
-    # |s_f| and |s_u| at their largest within V ≤ V_σ
-    forward = np.sqrt(2 * yielding * passes)
+    forward = largest_momenta(model)
     upward = 0.5 * math.tan(sigma_rad) * forward
-    errors = period_s * (
+    per_period = period_s * (
         forward * conditions.forward_error_m_s2 + upward * conditions.vertical_error_m_s2
     )
-    # while the speed limit forbids to damp: errors are changes of what came on top before, so in
-    # a half swing their work is that of a few periods
-    at_the_limit = _PERIODS_AT_THE_LIMIT * errors
+    offsets = period_s * (
+        forward * conditions.forward_offset_m_s2 + upward * conditions.vertical_offset_m_s2
+    )
+    # at the speed limit, where damping may not accelerate, velocity follows offsets a period late
+    at_the_limit = 2 * (offsets + per_period)
     ripple = conditions.storage_error * passes / (hanging_modes(beam)[0][0] * period_s)
-    delayed = conditions.delay_periods * (errors + conditions.storage_error * passes)
+    delay = conditions.delay_periods
+    # what is j periods old has changed j times, but not by more than offsets allow
+    changes = sum(np.minimum(j * per_period, 2 * offsets) for j in range(1, delay + 1))
+    delayed = changes + delay * conditions.storage_error * passes
     # between samples V is at most this much above the larger of its ends
     largest = task.max_acceleration_m_s2
     pull = GRAVITY_M_S2 * math.sin(sigma_rad) + largest
-    between = period_s**2 / 8 * yielding * pull * largest
+    between = period_s**2 / 8 * _yielding_mass(model) * pull * largest
     shares: Array = (at_the_limit + ripple + delayed + between) / passes
     return shares
+
+
+def largest_momenta(model: StorageModel) -> Array:
+    """Return |s_f| at its largest within V ≤ V_σ, (C,) kg·m/s."""
+    momenta: Array = np.sqrt(2 * _yielding_mass(model) * model.passes)
+    return momenta
 
 
 def _hanging_inertia(beam: BeamParams) -> Array:

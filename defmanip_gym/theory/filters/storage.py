@@ -7,7 +7,7 @@ about the vertical through the grasp and I_σ its largest within σ. Then
     Ḃ = −ż2ᵀ d_o22 ż2 − s_f a_f − s_u a_u + u2 u̇2 (I_σ − I_z),   B ≥ V,
 
 with s = m_o12ᵀ ż2 forward and upward, so that B does not rise either while |u2| does not.
-Derivation: docs/derivations.md, section 14.
+Derivation: docs/derivations.md, section 18.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ class StorageModel(NamedTuple):
         inertia: own inertia of the segments, (C, N) kg·m².
         spin: the same less that about their axis, (C, N) kg·m².
         stiffness: k_o22, (C, N, N) N·m/rad.
+        damping: d_o22, (C, N, N) N·m·s/rad; none unless asked for: V counts on none.
         yaw_inertia: I_σ − I_z(0), (C,) kg·m².
         mass: (C,) kg.
         passes: V_σ, (C,) J.
@@ -44,13 +45,16 @@ class StorageModel(NamedTuple):
     inertia: Array
     spin: Array
     stiffness: Array
+    damping: Array
     yaw_inertia: Array
     mass: Array
     passes: Array
 
     @classmethod
-    def of(cls, beams: tuple[BeamParams, ...], sigma_rad: float) -> StorageModel:
-        """Return the model of beams with equally many segments."""
+    def of(
+        cls, beams: tuple[BeamParams, ...], sigma_rad: float, *, damped: bool = False
+    ) -> StorageModel:
+        """Return the model of beams with equally many segments, with their damping or without."""
         models = [HangingBeam(beam) for beam in beams]
         chains = [model.chain.constants for model in models]
         spins = [chain.transverse - chain.axial for chain in chains]
@@ -60,6 +64,7 @@ class StorageModel(NamedTuple):
             inertia=np.array([chain.transverse for chain in chains]),
             spin=np.array(spins),
             stiffness=np.array([model.k_o22 for model in models]),
+            damping=float(damped) * np.array([model.d_o22 for model in models]),
             yaw_inertia=np.array(
                 [
                     sin(sigma_rad) ** 2 * (chain.second_moments.sum() + spin.sum())
@@ -150,8 +155,8 @@ def swing_step(
 ) -> None:
     """Write φ and φ̇ after a period of constant acceleration into ``room``.
 
-    The midpoint rule, implicit in the springs, so that stiff ones neither gain nor need small
-    steps; without damping. ``room.middle``, ``room.rate`` and the cosines and sines there are left
+    The midpoint rule, implicit in springs and dampers, so that stiff ones neither gain nor need
+    small steps. ``room.middle``, ``room.rate`` and the cosines and sines there are left
     for :func:`power_of`.
 
     Args:
@@ -179,6 +184,7 @@ def swing_step(
             W = model.coupling[c, j, k]
             turned = room.cosine[j] * room.cosine[k] + room.sine[j] * room.sine[k]
             room.M[j, k] = W * turned + half**2 * model.stiffness[c, j, k]
+            room.M[j, k] += half * model.damping[c, j, k]
             momentum += W * turned * swing_rate[k]
             turned = room.sine[j] * room.cosine[k] - room.cosine[j] * room.sine[k]
             torque += W * turned * swing_rate[k] ** 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Self
@@ -31,7 +32,11 @@ from defmanip_gym.theory.filters.batches import (
 )
 from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
 from defmanip_gym.theory.filters.limits import BRAKING_SHARE, RobotLimits, height_range
-from defmanip_gym.theory.filters.reserves import estimate_drift_rad, reserved_shares
+from defmanip_gym.theory.filters.reserves import (
+    estimate_drift_rad,
+    largest_momenta,
+    reserved_shares,
+)
 from defmanip_gym.theory.filters.safety_filter import (
     BoolArray,
     FilterDecision,
@@ -101,46 +106,32 @@ class StorageFilter(SafetyFilter):
         self.sigma_rad = validated_sigma(sigma_rad)
         self.conditions = require_params("conditions", conditions, FilterConditions)
         self.intervals = require_params("intervals", intervals, PayloadIntervals)
+        beam, conditions, task = self.beam, self.conditions, self.task
         self.segment_count = beam.segment_count
         self._layout = ObservationLayout(beam.segment_count)
         self._model = StorageModel.of(self.intervals.corners(beam), self.sigma_rad)
         self.pass_j = float(self._model.passes[0])
-        shares = 1.0 - reserved_shares(
-            self._model, beam, sigma_rad=self.sigma_rad, conditions=conditions, task=task
-        )
+        shares = self._level_shares()
         self.level_share = float(shares.min())
-        if not self.level_share >= _LEAST_LEVEL:
-            raise CertificateError(
-                "share of V_σ that errors, noise and delay leave",
-                self.level_share,
-                f"at least {_LEAST_LEVEL}",
-                "Allow a larger sigma_rad or smaller errors in conditions.",
-            )
         self.setup = StorageLevels(
             model=self._model,
             levels=shares * self._model.passes,
-            errors=np.array(self.errors_m_s2),
+            momenta=largest_momenta(self._model),
+            errors=np.minimum(
+                (conditions.delay_periods + 1) * np.array(self.errors_m_s2),
+                np.maximum(2 * np.array(self.offsets_m_s2), self.errors_m_s2),
+            ),
             residual=float(conditions.storage_error),
             limits=self._limits(),
         )
         self._room = DecisionRoom.empty(self.segment_count)
+        self._advancing = self.setup  # with which model the state is moved through a delay
         self._compile()
+        self._compile_decision()
 
     @without_garbage_collection()
     def _compile(self) -> None:
-        sensed, vectors = Sensed.empty(1, self.segment_count), np.empty((1, 3))
-        uncertainty, numbers = np.empty((1, self.segment_count)), np.empty(1)
-        self._decide = machine_code(
-            decide_all,
-            self.setup,
-            vectors,
-            sensed,
-            vectors,
-            uncertainty,
-            self._room,
-            vectors,
-            numbers,
-        )
+        sensed, vectors, numbers, _ = self._examples()
         self._compare = machine_code(
             compare_all, self.setup, vectors, sensed, sensed, vectors, vectors
         )
@@ -150,6 +141,49 @@ class StorageFilter(SafetyFilter):
             self._advance = machine_code(
                 advance_all, self.setup, vectors, vectors, sensed, self._room
             )
+
+    @without_garbage_collection()
+    def _compile_decision(self) -> None:
+        sensed, vectors, numbers, uncertainty = self._examples()
+        room = self._room
+        self._decide_all: Callable[..., None] = machine_code(
+            decide_all, self.setup, vectors, sensed, vectors, uncertainty, room, vectors, numbers
+        )
+
+    def _examples(self) -> tuple[Sensed, Array, Array, Array]:
+        """Return states, vectors, numbers, uncertainties: compiled code learns types from them."""
+        swing = np.empty((1, self.segment_count))
+        return Sensed.empty(1, self.segment_count), np.empty((1, 3)), np.empty(1), swing
+
+    def _decide(
+        self, wished: Array, sensed: Sensed, residual: Array, uncertainty: Array
+    ) -> FilterDecision:
+        allowed, margin = np.empty_like(wished), np.empty(len(wished))
+        self._decide_all(
+            self.setup, wished, sensed, residual, uncertainty, self._room, allowed, margin
+        )
+        return FilterDecision(allowed, margin)
+
+    def _level_shares(self) -> Array:
+        """Return up to which shares of V_σ B may rise, (C,), or raise CertificateError."""
+        shares = 1.0 - self._reserved_shares()
+        if not shares.min() >= _LEAST_LEVEL:
+            raise CertificateError(
+                "share of V_σ that errors, noise and delay leave",
+                float(shares.min()),
+                f"at least {_LEAST_LEVEL}",
+                "Allow a larger sigma_rad or smaller errors in conditions.",
+            )
+        return shares
+
+    def _reserved_shares(self) -> Array:
+        return reserved_shares(
+            self._model,
+            self.beam,
+            sigma_rad=self.sigma_rad,
+            conditions=self.conditions,
+            task=self.task,
+        )
 
     @property
     def specification(self) -> dict[str, Any]:
@@ -169,6 +203,12 @@ class StorageFilter(SafetyFilter):
             conditions.lateral_error_m_s2,
             conditions.vertical_error_m_s2,
         )
+
+    @property
+    def offsets_m_s2(self) -> tuple[float, float, float]:
+        """Offsets of acceleration that it provides for: forward, to the side (any), upwards."""
+        conditions = self.conditions
+        return conditions.forward_offset_m_s2, math.inf, conditions.vertical_offset_m_s2
 
     def with_conditions(self, **changes: Any) -> Self:
         """Return the same filter with other conditions, fields of ``FilterConditions``."""
@@ -220,20 +260,10 @@ class StorageFilter(SafetyFilter):
         if self.conditions.delay_periods:
             sensed = Sensed(*(part.copy() for part in sensed))
             for commands in memory.under_way[:-1]:
-                self._advance(self.setup, commands, memory.residual, sensed, self._room)
-        allowed, margin = np.empty_like(wished), np.empty(len(wished))
-        self._decide(
-            self.setup,
-            wished,
-            sensed,
-            memory.residual,
-            uncertainty,
-            self._room,
-            allowed,
-            margin,
-        )
-        memory.under_way[-1] = allowed
-        return FilterDecision(allowed, margin)
+                self._advance(self._advancing, commands, memory.residual, sensed, self._room)
+        decision = self._decide(wished, sensed, memory.residual, uncertainty)
+        memory.under_way[-1] = decision.allowed_m_s2
+        return decision
 
     def conclude(self, observation: Array, memory: StorageMemory) -> Array:
         """Take note of the observations, (n, size), at the end of the period.

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,9 +22,14 @@ from defmanip_gym.theory.payload.passivity import storage
 SIGMA = math.pi / 6
 
 
+@cache  # the pass is searched for whenever a model is made
+def model_of(beam):
+    return StorageModel.of((beam,), SIGMA)
+
+
 def stored(beam, swing, rate, yaw_rate=0.0):
     room = StorageRoom.empty(len(swing))
-    return storage_at(StorageModel.of((beam,), SIGMA), 0, swing, rate, yaw_rate, room)
+    return storage_at(model_of(beam), 0, swing, rate, yaw_rate, room)
 
 
 def random_states(segments, count=20, seed=0):
