@@ -27,19 +27,26 @@ def draw_phase(axes: Axes, ladder: Ladder) -> None:
     for sign in (-1.0, 1.0):
         label = "±σ" if sign > 0 else None
         axes.axvline(sign, color=_INK, linewidth=0.9, linestyle="--", label=label)
-    for line, colour in zip(ladder.filters, _COLOURS, strict=False):
-        if line.edge is not None:
-            label = f"kept by {line.name}, accelerations up to {line.largest_m_s2:g} m/s²"
-            _fill(axes, line.edge, ladder.sigma, colour, label)
+    sets = [
+        (f"kept by {line.name}, up to {line.largest_m_s2:g} m/s²", line.edge, colour)
+        for line, colour in zip(ladder.filters, _COLOURS, strict=False)
+        if line.edge is not None
+    ]
     reached = _reached(ladder)
     if reached is not None and ladder.tightest is not None:
         bound = ladder.tightest.acceleration_bound
         label = f"reached within {ladder.tightest.method}, up to {bound:.3g} m/s²"
-        _fill(axes, reached, ladder.sigma, _BOUND, label)
+        sets.append((label, reached, _BOUND))
+    for label, edge, colour in sorted(sets, key=lambda each: _area(each[1]), reverse=True):
+        _fill(axes, edge, ladder.sigma, colour, label)
     axes.set_xlabel("swing φ / σ")
     axes.set_ylabel("swing rate φ̇ (rad/s)")
     axes.set_xlim(-1.25, 1.25)
-    axes.legend(fontsize="small", loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    axes.legend(fontsize="small", loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+
+
+def _area(edge: Edge) -> float:
+    return float(np.trapezoid(edge[1], edge[0]))
 
 
 def _fill(axes: Axes, edge: Edge, sigma: float, colour: str, label: str) -> None:

@@ -5,7 +5,11 @@ from __future__ import annotations
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import BeamParams
-from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
+from defmanip_gym.theory.filters.conditions import (
+    LARGEST_FACTOR,
+    FilterConditions,
+    PayloadIntervals,
+)
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.validation import require_instance
 from defmanip_gym.wrappers.filter_errors import FilterErrors, filter_errors
@@ -87,4 +91,16 @@ def _drawn_around(config: TransportConfig, beam: BeamParams) -> PayloadIntervals
         shares = [getattr(each, name) / getattr(beam, name) for each in (beam, *carried)]
         return min(shares), max(shares)
 
-    return PayloadIntervals(mass=factors("mass_kg"), length=factors("length_m"))
+    return PayloadIntervals(
+        mass=factors("mass_kg"),
+        length=factors("length_m"),
+        damping=_damping_around(beam, carried),
+    )
+
+
+def _damping_around(beam: BeamParams, carried: tuple[BeamParams, ...]) -> tuple[float, float]:
+    """Return the factors on the damping, as far as intervals go: most filters need none."""
+    if not beam.damping > 0:
+        return 1.0, 1.0
+    shares = [each.damping / beam.damping for each in (beam, *carried)]
+    return min(shares), min(max(shares), LARGEST_FACTOR)

@@ -22,6 +22,7 @@ from defmanip_gym.cli import main
 from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError
 from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
+from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 HOSE = str(files("defmanip_gym.objects") / "examples" / "hose.xml")
@@ -76,9 +77,11 @@ def test_of_an_undamped_beam_filters_alone_are_told(beam, tmp_path, capsys):
 
 
 def test_of_many_segments_the_one_at_the_pass_is_named():
-    (line,) = ladder(segments=4, attack=False).filters
-    assert line.coordinate == "segment 4" and line.amplitude_rad is None
-    assert line.pass_j < ladder(attack=False).filters[0].pass_j
+    lines = ladder(segments=4, attack=False).filters
+    assert [line.name for line in lines] == list(STORAGE_FILTERS)
+    assert {line.coordinate for line in lines} == {"segment 4"}
+    assert lines[0].amplitude_rad is None
+    assert lines[0].pass_j < ladder(attack=False).filters[0].pass_j
 
 
 def test_a_filter_without_room_says_why(capsys, tmp_path):
@@ -90,12 +93,14 @@ def test_a_filter_without_room_says_why(capsys, tmp_path):
 
 def test_sets_of_one_hinge_are_drawn_within_sigma():
     axes = Figure().subplots()
-    draw_phase(axes, ladder(attack=False))
-    kept, reached = (patch.get_xy() for patch in axes.patches)
-    assert 0.9 < np.abs(kept[:, 0]).max() < 1.0
-    assert 0.99 < np.abs(reached[:, 0]).max() < 1.0 + 1e-6
-    labels = axes.get_legend_handles_labels()[1]
-    assert any("storage" in text for text in labels) and any("phase_plane" in t for t in labels)
+    one = ladder(attack=False)
+    draw_phase(axes, one)
+    widths = {p.get_label(): np.abs(p.get_xy()[:, 0]).max() for p in axes.patches}
+    (reached,) = (width for label, width in widths.items() if "phase_plane" in label)
+    assert 0.99 < reached < 1.0 + 1e-6
+    for line in one.filters:
+        (kept,) = (width for label, width in widths.items() if f"kept by {line.name}," in label)
+        assert 0.9 < kept < 1.0
     assert not has_phase_plane(ladder(segments=2, attack=False))
 
 

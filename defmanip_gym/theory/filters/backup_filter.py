@@ -13,6 +13,7 @@ from defmanip_gym.compiled import machine_code, without_garbage_collection
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams
 from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 from defmanip_gym.theory.filters.backup import BackupRoom, BackupSetup
 from defmanip_gym.theory.filters.backup_decision import decide_backup_all, show_all
 from defmanip_gym.theory.filters.safety_filter import BoolArray, FilterDecision, FilterProof
@@ -27,6 +28,7 @@ _HANDOVER = 0.04  # of V_σ: room for the tube where rollouts end
 _LEAST_SHARE = 0.5  # of V_σ: where errors leave less, rollouts have to reckon with them alone
 _FEWEST_SUBSTEPS, _MOST_SUBSTEPS = 2, 4
 _STEP_RAD = 1.5  # of the fastest vibration that a substep should cover
+_EDGE_ANGLES, _EDGE_RATES, _EDGE_REACH = 201, 401, 2.0  # of the picture of what is safe
 _RESERVE = 0.01  # of σ: between substeps, and for what integrators differ in within a period
 
 
@@ -69,6 +71,29 @@ class BackupFilter(StorageFilter):
         self._show_all(self.backup, sensed, memory.residual, uncertainty, self._backup_room, margin)
         within: BoolArray = margin >= 0.0
         return within
+
+    def edge(self) -> tuple[Array, Array] | None:
+        """Return the upper edge (φ, φ̇) of what is shown to be safe, one hinge only, else None.
+
+        Of a grasp at rest, with the arm as at the goal; rates to within a two-hundredth.
+        """
+        level = super().edge()
+        if level is None:
+            return None
+        swing = np.linspace(-self.sigma_rad, self.sigma_rad, _EDGE_ANGLES)
+        rate = np.linspace(0.0, _EDGE_REACH * float(level[1].max()), _EDGE_RATES)
+        sensed = Sensed.empty(swing.size * rate.size, 1)
+        sensed.pitch[:] = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
+        sensed.swing[:, 0] = np.repeat(swing, rate.size)
+        sensed.swing_rate[:, 0] = np.tile(rate, swing.size)
+        count = len(sensed.swing)
+        margin, nothing = np.empty(count), np.zeros((count, 3))
+        no_noise = np.zeros((count, 1))
+        self._show_all(self.backup, sensed, nothing, no_noise, self._backup_room, margin)
+        # up to the first rate that is not safe
+        safe = np.logical_and.accumulate(margin.reshape(swing.size, rate.size) >= 0.0, axis=1)
+        kept = safe[:, 0]
+        return swing[kept], rate[safe.sum(axis=1)[kept] - 1]
 
     def _decide(
         self, wished: Array, sensed: Sensed, residual: Array, uncertainty: Array

@@ -11,7 +11,7 @@ from defmanip_gym.validation import require_number, require_range, require_whole
 
 _LARGEST_ERROR = 1000.0
 _LONGEST_DELAY = 50
-_SMALLEST_FACTOR, _LARGEST_FACTOR = 0.01, 100.0
+_SMALLEST_FACTOR, LARGEST_FACTOR = 0.01, 100.0
 _ROUNDING = 1e-9
 
 
@@ -78,7 +78,7 @@ class PayloadIntervals:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             smallest = 0.0 if name == "damping" else _SMALLEST_FACTOR
-            settle(self, name, require_range, smallest, _LARGEST_FACTOR)
+            settle(self, name, require_range, smallest, LARGEST_FACTOR)
             low, high = getattr(self, name)
             if not low <= 1.0 <= high:
                 raise ParameterError(

@@ -28,6 +28,17 @@ def whip(segments, stiffness=5.0, joint_damping=0.02):
     )
 
 
+def test_the_drawn_edge_of_one_hinge_is_between_storages_and_sigma():
+    made, level = BackupFilter(), StorageFilter().edge()
+    swing, rate = made.edge()
+    assert np.abs(swing).max() < SIGMA - 0.009 * SIGMA
+    inside = np.abs(level[0]) < swing.max()
+    # where V allows a rate, a rollout shows it too, to within the picture's steps
+    assert (np.interp(level[0][inside], swing, rate) > 0.98 * level[1][inside] - 0.02).all()
+    assert np.trapezoid(rate, swing) > 1.2 * np.trapezoid(level[1], level[0])
+    assert BackupFilter(BeamParams(segment_count=2)).edge() is None
+
+
 def observed(sensed):
     """What an environment would tell of states, as far as filters look at it."""
     count, segments = sensed.swing.shape
