@@ -21,8 +21,9 @@ III                ``certificates``: ``low_gain`` (24)–(26); ``iss_gain`` (17)
 III, beyond        ``filters``: ``storage``, Lemma III.1's V as a barrier; ``safety_filter``,
                    ``conditions``, ``storage_filter``: the family and its closed form, built of
                    ``sensed``, ``period_mean``, ``limits``, ``decision``, ``foresight``,
-                   ``swing_estimate``; ``viability``, ``viability_bounds``, what is possible at
-                   all, and ``viability_share``, how much of it is allowed
+                   ``swing_estimate``; ``qp_filter``, ``barrier_rows``, what the literature would
+                   do; ``viability``, ``viability_bounds``, what is possible at all, and
+                   ``viability_share``, how much of it is allowed
 IV.A, V            ``control``: ``velocity_field`` IV.A; ``control_laws`` (20), (27), (29);
                    ``continuous_loop`` (30)–(34); ``stability``, ``effective_damping``: what
                    sampling and wrong parameters make of it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -126,12 +127,22 @@ class StorageFilter(SafetyFilter):
         )
         self._room = DecisionRoom.empty(self.segment_count)
         self._compile()
+        self._compile_decision()
 
     @without_garbage_collection()
     def _compile(self) -> None:
-        sensed, vectors = Sensed.empty(1, self.segment_count), np.empty((1, 3))
-        uncertainty, numbers = np.empty((1, self.segment_count)), np.empty(1)
-        self._decide = machine_code(
+        sensed, vectors, numbers, _ = self._examples()
+        self._foresee = machine_code(foresee_all, self.setup, vectors, sensed, vectors)
+        self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
+        if self.conditions.delay_periods:
+            self._advance = machine_code(
+                advance_all, self.setup, vectors, vectors, sensed, self._room
+            )
+
+    @without_garbage_collection()
+    def _compile_decision(self) -> None:
+        sensed, vectors, numbers, uncertainty = self._examples()
+        self._decide_all: Callable[..., None] = machine_code(
             decide_all,
             self.setup,
             vectors,
@@ -142,12 +153,20 @@ class StorageFilter(SafetyFilter):
             vectors,
             numbers,
         )
-        self._foresee = machine_code(foresee_all, self.setup, vectors, sensed, vectors)
-        self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
-        if self.conditions.delay_periods:
-            self._advance = machine_code(
-                advance_all, self.setup, vectors, vectors, sensed, self._room
-            )
+
+    def _examples(self) -> tuple[Sensed, Array, Array, Array]:
+        """Return states, vectors, numbers, uncertainties: compiled code learns types from them."""
+        swing = np.empty((1, self.segment_count))
+        return Sensed.empty(1, self.segment_count), np.empty((1, 3)), np.empty(1), swing
+
+    def _decide(
+        self, wished: Array, sensed: Sensed, residual: Array, uncertainty: Array
+    ) -> FilterDecision:
+        allowed, margin = np.empty_like(wished), np.empty(len(wished))
+        self._decide_all(
+            self.setup, wished, sensed, residual, uncertainty, self._room, allowed, margin
+        )
+        return FilterDecision(allowed, margin)
 
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
@@ -187,19 +206,9 @@ class StorageFilter(SafetyFilter):
         memory.before = Sensed(*(part.copy() for part in sensed))
         for commands in memory.under_way[:-1]:
             self._advance(self.setup, commands, memory.residual, sensed, self._room)
-        allowed, margin = np.empty_like(wished), np.empty(len(wished))
-        self._decide(
-            self.setup,
-            wished,
-            sensed,
-            memory.residual,
-            uncertainty,
-            self._room,
-            allowed,
-            margin,
-        )
-        memory.under_way[-1] = allowed
-        return FilterDecision(allowed, margin)
+        decision = self._decide(wished, sensed, memory.residual, uncertainty)
+        memory.under_way[-1] = decision.allowed_m_s2
+        return decision
 
     def conclude(self, observation: Array, memory: StorageMemory) -> Array:
         """Take note of the observations, (n, size), at the end of the period.
