@@ -155,6 +155,26 @@ def test_beyond_the_level_it_damps_and_says_so(program):
     assert decision.allowed_m_s2[0, 0] == pytest.approx(A_MAX, abs=0.01)
 
 
+def test_nothing_is_faster_ahead_than_the_limit_not_even_beyond_the_level(program):
+    observed, wished = observations(500, rate=9.0)
+    velocity = ObservationLayout(1).part(observed, "grasp_velocity_b")
+    heading = velocity / np.linalg.norm(velocity, axis=1)[:, None]
+    velocity[:] = 1.99 * heading
+    decision = allowed_by(program, wished, observed)
+    ahead = (heading * (velocity + 0.02 * decision.allowed_m_s2)).sum(axis=1)
+    assert (decision.margin < 0).sum() > 200
+    assert ahead.max() == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_grasp_above_the_speed_limit_may_brake_gently(program):
+    observed, _ = observations(20, rate=0.0)
+    ObservationLayout(1).part(observed, "grasp_velocity_b")[:] = (2.5, 0.0, 0.0)
+    wished = np.tile((-0.5, 0.0, 0.0), (20, 1))
+    decision = allowed_by(program, wished, observed)
+    assert (decision.margin > 0).all()
+    assert np.array_equal(decision.allowed_m_s2, wished)
+
+
 def pumped(made, *, axes, hold, steps=300, count=64):
     """Swing over σ and B over its level, at worst, of episodes that go on."""
     env = DeformTransportVectorEnv(
