@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from defmanip_gym.compiled import compilable, compiled
+from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.robot_model import reach_and_height, reach_and_height_slopes
 from defmanip_gym.theory.filters.decision import DecisionRoom, StorageLevels
@@ -21,10 +22,14 @@ def half_spaces_all(
     room: DecisionRoom,
     slopes: Array,
     bounds: Array,
+    limited: Array,
     excess: Array,
     margins: Array,
 ) -> None:
     """Write the half spaces slope · w ≤ bound of n states, and how wishes and states stand to them.
+
+    A wish is taken for what the speed limiter would leave of it: who wants to go on at the limit
+    needs no filter for that.
 
     Args:
         setup: levels and robot.
@@ -34,18 +39,30 @@ def half_spaces_all(
         room: for intermediate results.
         slopes: (n, C + 1, 3): of the barriers of C beams, over V_σ, 1/s per m/s²; of the speed.
         bounds: (n, C + 1), 1/s and m/s².
-        excess: of the wish over the bound that it exceeds most, or over the box, (n,).
+        limited: what is left of the wishes, (n, 3) m/s².
+        excess: of that over the bound that it exceeds most, or of the wish over the box, (n,).
         margins: (level − B) / V_σ of the beam where it is smallest, (n,).
     """
-    largest, beams = setup.limits.max_acceleration_m_s2, len(setup.levels)
+    limits, beams = setup.limits, len(setup.levels)
     for i in range(len(margins)):
         margins[i] = _barriers(setup, gamma, sensed, i, room, slopes[i], bounds[i])
         _speed_limit(setup, sensed, i, slopes[i, beams], bounds[i])
-        excess[i] = max(abs(wished[i, 0]), abs(wished[i, 1]), abs(wished[i, 2])) - largest
+        limited[i, 0], limited[i, 1], limited[i, 2] = limited_acceleration(
+            wished[i, 0],
+            wished[i, 1],
+            wished[i, 2],
+            sensed.velocity_b[i, 0],
+            sensed.velocity_b[i, 1],
+            sensed.velocity_b[i, 2],
+            limits.max_speed_m_s,
+            limits.period_s,
+        )
+        largest = max(abs(wished[i, 0]), abs(wished[i, 1]), abs(wished[i, 2]))
+        excess[i] = largest - limits.max_acceleration_m_s2
         for c in range(beams + 1):
             along = 0.0
             for axis in range(3):
-                along += slopes[i, c, axis] * wished[i, axis]
+                along += slopes[i, c, axis] * limited[i, axis]
             excess[i] = max(excess[i], along - bounds[i, c])
 
 

@@ -2,9 +2,11 @@
 
 The same barrier as ``storage``, but in continuous time: minimize |w − w*|² subject to ḣ ≥ −γ h with
 h = level − B, the box of the largest acceleration, and the half space that touches the ball of the
-speed limit where the grasp is heading. It proves nothing for a robot that samples: neither what h
-does within a period, nor what the speed limiter makes of a command that is beside the ball, nor
-what drive and arm can do is foreseen. Kept as a reference to compare with.
+speed limit where the grasp is heading; w* is what the speed limiter would leave of the wish.
+
+It proves nothing for a robot that samples: neither what h does within a period, nor what the
+limiter makes of a command that is beside the ball, nor what drive and arm can do is foreseen. Kept
+as a reference to compare with.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ class CbfQpParams:
             for states beyond the level, and for turns that raise B whatever is commanded.
     """
 
-    gamma_per_s: float = 5.0
+    gamma_per_s: float = 10.0
     slack_weight: float = 1e4
 
     def __post_init__(self) -> None:
@@ -115,6 +117,7 @@ class CbfQpFilter(StorageFilter):
             self._room,
             np.empty((1, rows, 3)),
             np.empty((1, rows)),
+            vectors,
             numbers,
             numbers,
         )
@@ -124,7 +127,7 @@ class CbfQpFilter(StorageFilter):
     ) -> FilterDecision:
         count, rows = len(wished), len(self.setup.levels) + 1
         slopes, bounds = np.empty((count, rows, 3)), np.empty((count, rows))
-        excess, margin = np.empty(count), np.empty(count)
+        limited, excess, margin = np.empty_like(wished), np.empty(count), np.empty(count)
         self._half_spaces(
             self.setup,
             self.params.gamma_per_s,
@@ -133,18 +136,19 @@ class CbfQpFilter(StorageFilter):
             self._room,
             slopes,
             bounds,
+            limited,
             excess,
             margin,
         )
         allowed = wished.copy()
         for i in (excess > _TOLERANCE).nonzero()[0]:
-            allowed[i] = self._nearest(wished[i], slopes[i], bounds[i])
+            allowed[i] = self._nearest(limited[i], slopes[i], bounds[i])
         return FilterDecision(allowed, margin)
 
-    def _nearest(self, wished: Array, slopes: Array, bounds: Array) -> Array:
-        """Return the w nearest to the wished one within half spaces, (3,) m/s²."""
+    def _nearest(self, wanted: Array, slopes: Array, bounds: Array) -> Array:
+        """Return the w nearest to the wanted one within half spaces, (3,) m/s²."""
         farthest = _FARTHEST * self._largest
-        linear = np.append(-np.clip(wished, -farthest, farthest), 0.0)
+        linear = np.append(-np.clip(wanted, -farthest, farthest), 0.0)
         rows = np.column_stack((slopes, -np.ones(len(slopes))))
         rows[-1, 3] = 0.0  # no slack on the speed limit
         high = np.concatenate(((self._largest,) * 3, (np.inf,), bounds))

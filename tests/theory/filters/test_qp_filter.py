@@ -12,6 +12,7 @@ from defmanip_gym.errors import (
 )
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.theory.control.control_laws import limit_speed
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
 from defmanip_gym.theory.filters.barrier_rows import half_spaces_all
 from defmanip_gym.theory.filters.conditions import PayloadIntervals
@@ -54,9 +55,13 @@ def observations(count, segments=1, seed=0, rate=3.0):
 def half_spaces(made, wished, sensed):
     rows = len(made.setup.levels) + 1
     slopes, bounds = np.empty((len(wished), rows, 3)), np.empty((len(wished), rows))
-    excess, margin = np.empty(len(wished)), np.empty(len(wished))
-    room, gamma = DecisionRoom.empty(made.segment_count), made.params.gamma_per_s
-    half_spaces_all(made.setup, gamma, wished, sensed, room, slopes, bounds, excess, margin)
+    limited, excess, margin = np.empty_like(wished), *np.empty((2, len(wished)))
+    half_spaces_all(
+        made.setup,
+        made.params.gamma_per_s,
+        *(wished, sensed, DecisionRoom.empty(made.segment_count)),
+        *(slopes, bounds, limited, excess, margin),
+    )
     return slopes, bounds, excess, margin
 
 
@@ -93,7 +98,9 @@ def test_a_barriers_half_space_is_the_derivative_of_b(segments):
         after = storage_at(model, 0, *later, u2 + step * turning[i], room)
         growth = (after - before) / step / made.pass_j
         condition = slopes[i, 0] @ wished[i] - bounds[i, 0]
-        assert condition == pytest.approx(growth - 5.0 * margin[i], rel=1e-3, abs=1e-3)
+        assert condition == pytest.approx(
+            growth - made.params.gamma_per_s * margin[i], rel=1e-3, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize("length", [(1.0, 1.0), (0.8, 1.2)])
@@ -105,19 +112,23 @@ def test_no_command_that_is_drawn_is_nearer_and_allowed(length):
     slopes, bounds, _, _ = half_spaces(
         made, wished, Sensed.observed(ObservationLayout(1), observed)
     )
+    velocity = ObservationLayout(1).part(observed, "grasp_velocity_b")
+    wanted = limit_speed(wished, velocity, 2.0, 0.02)
     rng, changed = np.random.default_rng(1), 0
 
     def cost(w, i):
         beyond = w @ slopes[i].T - bounds[i]
         slack = np.maximum(beyond[:, :-1].max(axis=1), 0.0)
         outside = (np.abs(w).max(axis=1) > A_MAX + 1e-6) | (beyond[:, -1] > 1e-6)
-        total = ((w - wished[i]) ** 2).sum(axis=1) + made.params.slack_weight * slack**2
+        total = ((w - wanted[i]) ** 2).sum(axis=1) + made.params.slack_weight * slack**2
         return np.where(outside, np.inf, total)
 
     for i in range(COUNT):
         found = decision.allowed_m_s2[i]
+        if np.array_equal(found, wished[i]):  # the robot will do what is left of it
+            found = wanted[i]
         own = cost(found[None], i)[0]
-        changed += not np.array_equal(found, wished[i])
+        changed += not np.array_equal(found, wanted[i])
         spread = 10.0 ** rng.uniform(-4, 0.8, (20000, 1))
         near = np.clip(found + spread * rng.normal(size=(20000, 3)), -A_MAX, A_MAX)
         assert own <= cost(near, i).min() + 1e-4
@@ -132,6 +143,13 @@ def test_wishes_pass_as_they_are_where_nothing_binds(program):
     same = (decision.allowed_m_s2 == wished).all(axis=1)
     assert (same == (excess <= 1e-9)).all()
     assert 50 < same.sum() < 450
+
+
+def test_who_wants_to_be_faster_than_the_limit_is_left_to_the_limiter(program):
+    observed, _ = observations(20, rate=0.0)
+    ObservationLayout(1).part(observed, "grasp_velocity_b")[:] = (2.0, 0.0, 0.0)
+    wished = np.tile((3.0, 0.0, 0.0), (20, 1))
+    assert np.array_equal(allowed_by(program, wished, observed).allowed_m_s2, wished)
 
 
 def test_a_decision_does_not_depend_on_its_batch(program):
@@ -161,7 +179,12 @@ def test_nothing_is_faster_ahead_than_the_limit_not_even_beyond_the_level(progra
     heading = velocity / np.linalg.norm(velocity, axis=1)[:, None]
     velocity[:] = 1.99 * heading
     decision = allowed_by(program, wished, observed)
-    ahead = (heading * (velocity + 0.02 * decision.allowed_m_s2)).sum(axis=1)
+    realized = np.where(
+        (decision.allowed_m_s2 == wished).all(axis=1)[:, None],
+        limit_speed(wished, velocity, 2.0, 0.02),
+        decision.allowed_m_s2,
+    )
+    ahead = (heading * (velocity + 0.02 * realized)).sum(axis=1)
     assert (decision.margin < 0).sum() > 200
     assert ahead.max() == pytest.approx(2.0, abs=1e-6)
 
