@@ -87,6 +87,14 @@ class StorageFilter(SafetyFilter):
 
     name = "storage"
     proof: FilterProof = "nonlinear"
+    arguments: tuple[str, ...] = (
+        "beam",
+        "sigma_rad",
+        "robot",
+        "task",
+        "conditions",
+        "intervals",
+    )
 
     def __init__(
         self,
@@ -186,8 +194,7 @@ class StorageFilter(SafetyFilter):
     @property
     def specification(self) -> dict[str, Any]:
         """What the filter was made with, as JSON values."""
-        names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
-        return {"name": self.name} | {name: plain(getattr(self, name)) for name in names}
+        return {"name": self.name} | {name: plain(getattr(self, name)) for name in self.arguments}
 
     @property
     def errors_m_s2(self) -> tuple[float, float, float]:
@@ -214,8 +221,7 @@ class StorageFilter(SafetyFilter):
         return self._with(beam=beam, intervals=PayloadIntervals())
 
     def _with(self, **changes: Any) -> Self:
-        names = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
-        return type(self)(**{name: getattr(self, name) for name in names} | changes)
+        return type(self)(**{name: getattr(self, name) for name in self.arguments} | changes)
 
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
