@@ -12,12 +12,14 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.analysis import analyse
 from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.records import EpisodeRecord
-from defmanip_gym.evaluation.report.columns import COLUMNS
+from defmanip_gym.evaluation.report.columns import COLUMNS, Column
+from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS
 from defmanip_gym.evaluation.report.sentences import certificate_claim, suite_claims
 from defmanip_gym.evaluation.store import read_records
 from defmanip_gym.evaluation.suites import SUITES, Suite
@@ -25,7 +27,7 @@ from defmanip_gym.evaluation.suites import SUITES, Suite
 DOCS = Path(__file__).parent
 BENCHMARK = DOCS.parent / "results" / "benchmark"
 IMAGES = "images/results"
-_MACHINES_OWN = "Decision"  # its column holds wall times
+_MACHINES_OWN = "Decision"  # columns with this heading hold wall times
 _FIGURES = {
     "forest": "Score (IQM) of each contestant, with 95 % intervals.",
     "profiles": "Share of episodes that score above τ, for the best of each kind.",
@@ -44,8 +46,8 @@ page: it runs
 and then `python docs/make_results.py`, which takes everything from there. What suites, numbers and
 intervals mean: [evaluation.md](evaluation.md). What each agent is: `defmanip agents`.
 
-How to read it: a contestant's part after the slash is the certificate that is enforced on it;
-without a slash there is none. Scores are mean speeds towards the goal as a share of the speed
+How to read it: a contestant's part after the slash is the safety filter around it; without a slash
+there is none. Scores are mean speeds towards the goal as a share of the speed
 limit, 0 for an episode without success. A sentence names a winner only where intervals separate it
 from everybody else in its class. Small print in the tables: 95 % intervals. How long a decision
 takes depends on the machine, and is in the report that `evaluate.py` writes.
@@ -69,6 +71,7 @@ def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
         present = [suite for suite in SUITES if any(row["suite"] == suite.name for row in rows)]
         folder = benchmark / "tables"
         tables = {s.name: (folder / f"{s.name}.md").read_text("utf-8") for s in present}
+        of_filters = {s.name: folder / f"{s.name}-filters.md" for s in present}
         command = re.search(r"^Made by `([^`]*)`", next(iter(tables.values())), re.M)
     except (OSError, KeyError, StopIteration) as error:
         raise RecordError(
@@ -96,8 +99,14 @@ def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
             *(f"* {claim.text} {claim.detail}".rstrip() for claim in claims),
             "",
             *_figures(benchmark, docs, suite.name, command[1]),
-            _without_wall_times(tables[suite.name]),
+            _without_wall_times(tables[suite.name], ["Contestant", *_titles(COLUMNS), "Knows"]),
         ]
+        if of_filters[suite.name].exists():
+            table = of_filters[suite.name].read_text("utf-8")
+            parts += [
+                "What each filter does to the controllers that ran both alone and inside it:\n",
+                _without_wall_times(table, ["Filter", *_titles(FILTER_COLUMNS)]),
+            ]
     page = docs / "results.md"
     page.write_text("\n".join(parts), encoding="utf-8")
     return page
@@ -143,14 +152,19 @@ def _figures(benchmark: Path, docs: Path, suite: str, command: str) -> list[str]
     return lines
 
 
-def _without_wall_times(table: str) -> str:
-    """Return a Markdown table without the column that depends on the machine."""
-    titles = [column.heading for column in COLUMNS]
-    place = 2 + titles.index(_MACHINES_OWN)  # after the line's beginning and the contestant
+def _titles(columns: Sequence[Column[Any]]) -> list[str]:
+    return [column.heading for column in columns]
+
+
+def _without_wall_times(table: str, headings: Sequence[str]) -> str:
+    """Return a Markdown table without the columns that depend on the machine."""
+    kept = [heading != _MACHINES_OWN for heading in ("", *headings, "")]  # ends of the line, too
     lines = []
     for line in table.splitlines():
         cells = re.split(r"(?<!\\)\|", line)
-        lines.append("|".join(cells[:place] + cells[place + 1 :]) if len(cells) > place else line)
+        if len(cells) == len(kept):
+            line = "|".join(cell for cell, keep in zip(cells, kept, strict=True) if keep)
+        lines.append(line)
     return "\n".join(lines) + "\n"
 
 

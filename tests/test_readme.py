@@ -7,14 +7,24 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
+SCRIPTS = re.findall(r"```python\n(.*?)```", README, re.S)
 
 
 def test_the_script_in_the_readme_runs_and_succeeds(capsys):
-    (script,) = re.findall(r"```python\n(.*?)```", README, re.S)
+    (script,) = (each for each in SCRIPTS if "TannerController" in each)
     exec(compile(script, "README.md", "exec"), {})
     success, margin = capsys.readouterr().out.split()
     assert success == "True"
     assert float(margin) > 0
+
+
+def test_the_agent_inside_the_filter_arrives_and_is_hardly_ever_corrected(capsys):
+    (script,) = (each for each in SCRIPTS if "SafetyFilterWrapper" in each)
+    exec(compile(script, "README.md", "exec"), {})
+    success, applies, rate = capsys.readouterr().out.split()
+    assert success == applies == "True"
+    assert float(rate) < 0.02
+    assert len(SCRIPTS) == 2
 
 
 @pytest.mark.parametrize(
@@ -24,6 +34,7 @@ def test_the_script_in_the_readme_runs_and_succeeds(capsys):
         "CONTRIBUTING.md",
         "docs/architecture.md",
         "docs/evaluation.md",
+        "docs/filters.md",
         "docs/training.md",
         "docs/performance.md",
         "docs/recipes.md",

@@ -24,7 +24,7 @@ def agents_table(cards: Mapping[str, AgentCard]) -> Table:
     table.add_column("agent", no_wrap=True)
     table.add_column("recipe", no_wrap=True)
     table.add_column("steps", justify="right", no_wrap=True)
-    table.add_column("certificate")
+    table.add_column("trained\ninside")
     table.add_column(f"success (%)\n{_LISTED_SUITE}", justify="right")
     table.add_column(f"score\n{_LISTED_SUITE}", justify="right")
     for name, card in cards.items():
@@ -33,7 +33,7 @@ def agents_table(cards: Mapping[str, AgentCard]) -> Table:
             escape(name),
             card.recipe,
             f"{card.total_timesteps / 1e6:.2f} M",
-            card.certificate or _NONE,
+            card.trained_inside or _NONE,
             _NONE if score is None else _success(score),
             _NONE if score is None else f"{score.score_iqm:.3f}",
         )

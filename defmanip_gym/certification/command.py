@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.certification.filter_table import filter_table
 from defmanip_gym.certification.ladder import compute_ladder
 from defmanip_gym.certification.plot import save_plot
 from defmanip_gym.certification.table import ladder_table, numbers, remarks
@@ -30,6 +31,7 @@ def run_certify(config: CertifyConfig) -> Path:
         with console.status("linearizing") as status:
             ladder = compute_ladder(config, status.update)
             console.print(ladder_table(ladder))
+            console.print(filter_table(ladder))
             for line in remarks(ladder):
                 console.print(line, highlight=False)
             status.update("writing")

@@ -18,11 +18,15 @@ from defmanip_gym.validation import require_flag, require_number, settle
 class CertifyConfig:
     """Compute every bound on the grasp's acceleration for an object, and attack the tightest.
 
+    For beams, damped or not, it also tells what filters that measure the swing keep.
+
     The object is a beam of rigid segments (the default is the paper's), an elastic beam where
     --bending-stiffness is given, or what an MJCF file holds.
 
     Examples:
         defmanip certify --damping 1.0
+
+        defmanip certify --damping 0
 
         defmanip certify --segments 3 --joint-stiffness 3 --damping-interval 0.5 2
 

@@ -12,6 +12,7 @@ from defmanip_gym.attack.certificate import attack_certificate, withstanding
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.attack.target import Target, beam_target, mjcf_target
 from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.certification.filters import FilterLine, beam_lines, file_lines
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.objects.mjcf_object import mjcf_object
 from defmanip_gym.params import BeamParams
@@ -33,30 +34,36 @@ class Ladder:
 
     Attributes:
         linear: the object linearized.
+        sigma: σ, rad or m.
         conditions: what was asked of the motion.
-        certificates: by method; those that exist.
+        certificates: by method; those that exist, none of them proven for an undamped object.
         refusals: by method, why there is none.
+        filters: that measure the swing.
         resonant_limit: amplitude of the forward sinusoid that uses up σ of the linear object, m/s².
         attack: on the tightest certificate, if asked for.
         withstanding: that certificate, lowered until attacks did not break it any more; None where
             it was not broken or is broken however low.
         target: the object on its rig, as attacked.
+        is_from_file: whether it is an object from a file.
     """
 
     linear: LinearizedObject
+    sigma: float
     conditions: CertificateConditions
     certificates: dict[str, Certificate]
     refusals: dict[str, str]
+    filters: tuple[FilterLine, ...]
     resonant_limit: float
     attack: AttackResult | None
     withstanding: Certificate | None
     target: Target
+    is_from_file: bool
 
     @property
-    def tightest(self) -> Certificate:
-        """The certificate with the largest bound that is one."""
-        proven = (c for c in self.certificates.values() if c.is_proven)
-        return max(proven, key=lambda certificate: certificate.acceleration_bound)
+    def tightest(self) -> Certificate | None:
+        """The certificate with the largest bound that is one; None of an undamped object."""
+        proven = [c for c in self.certificates.values() if c.is_proven]
+        return max(proven, key=lambda c: c.acceleration_bound, default=None)
 
     def is_broken(self, certificate: Certificate) -> bool:
         """Whether the attack's input is within this certificate and exceeds σ."""
@@ -81,10 +88,11 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         tell: is told what is going on.
 
     Raises:
-        CertificateError: no method gives a certificate.
+        CertificateError: no method gives a certificate, and no filter does without.
         ObjectFileError: the model file cannot be used.
     """
     deformable: BeamParams | LinearizedObject
+    thing = None
     if config.mjcf is not None:
         tell(f"reading {config.mjcf}")
         thing = mjcf_object(config.mjcf, grasp_site=config.grasp_site)
@@ -109,23 +117,35 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
             )
         except CertificateError as error:
             refusals[method] = error
-    if not any(certificate.is_proven for certificate in certificates.values()):
-        raise refusals["l1"]  # the method that leaves most room to every object
+    tell("filters")
+    if thing is not None:
+        filters = file_lines(config, conditions, thing)
+    else:
+        filters = beam_lines(config, conditions, target.linear.coordinates)
+    is_certified = any(certificate.is_proven for certificate in certificates.values())
+    if not is_certified:
+        refusal = refusals["l1"]  # the method that leaves most room to every object
+        # only filters do without damping, and what else was asked for they cannot mend
+        if refusal.name != "damping" or not any(line.admits for line in filters):
+            raise refusal
     tell("nonlinear limit")
     ladder = Ladder(
         linear=target.linear,
+        sigma=config.sigma,
         conditions=conditions,
         certificates=certificates,
         refusals={method: str(error) for method, error in refusals.items()},
-        resonant_limit=_resonant_limit(target.linear, config.sigma),
+        filters=filters,
+        resonant_limit=_resonant_limit(target.linear, config.sigma) if is_certified else 0.0,
         attack=None,
         withstanding=None,
         target=target,
+        is_from_file=thing is not None,
     )
-    if not config.attack:
+    tightest, longest_s = ladder.tightest, config.longest_attack_s
+    if not config.attack or tightest is None:
         return ladder
     tell("attack on the plant")
-    tightest, longest_s = ladder.tightest, config.longest_attack_s
     attack = attack_certificate(tightest, target=target, longest_s=longest_s)
     lowered = None
     if attack.is_broken:

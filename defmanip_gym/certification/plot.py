@@ -1,8 +1,9 @@
-"""The ladder as a picture: bounds on a logarithmic axis, and the attack against ±σ."""
+"""The ladder as a picture: bounds on a logarithmic axis, sets of one hinge, the attack."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ from matplotlib.figure import Figure
 
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.certification.ladder import Ladder
+from defmanip_gym.certification.phase_plot import draw_phase, has_phase_plane
 from defmanip_gym.certification.table import PROOFS
 from defmanip_gym.display import save_figure
 from defmanip_gym.plant.object_rig import ObjectRig
+from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.dynamics.chain import Array
 
 _COLOURS = {"nonlinear": "#1b7f4d", "linear": "#2f6db3", "none": "#b9b9b9"}
@@ -22,12 +25,17 @@ _INK, _RED = "#333333", "#c0392b"
 
 def save_plot(path: Path, ladder: Ladder) -> None:
     """Write the picture as PNG."""
-    panels = 1 if ladder.attack is None or not _has_trajectory(ladder.attack) else 2
-    figure = Figure(figsize=(8.0, 3.4 * panels), layout="constrained")
-    axes = np.atleast_1d(figure.subplots(panels, 1))
-    _draw_bounds(axes[0], ladder)
-    if panels == 2 and ladder.attack is not None:
-        _draw_attack(axes[1], ladder, ladder.attack)
+    panels: list[Callable[[Axes], None]] = []
+    if ladder.certificates or not has_phase_plane(ladder):
+        panels.append(lambda axes: _draw_bounds(axes, ladder))
+    if has_phase_plane(ladder):
+        panels.append(lambda axes: draw_phase(axes, ladder))
+    attack, tightest = ladder.attack, ladder.tightest
+    if attack is not None and tightest is not None and _has_trajectory(attack):
+        panels.append(lambda axes: _draw_attack(axes, ladder, attack, tightest))
+    figure = Figure(figsize=(8.0, 3.4 * len(panels)), layout="constrained")
+    for axes, draw in zip(np.atleast_1d(figure.subplots(len(panels), 1)), panels, strict=True):
+        draw(axes)
     save_figure(path, figure)
 
 
@@ -37,6 +45,8 @@ def _has_trajectory(attack: AttackResult) -> bool:
 
 def _draw_bounds(axes: Axes, ladder: Ladder) -> None:
     methods = list(ladder.certificates)
+    if not methods:
+        axes.text(0.5, 0.5, "no bound holds for ever", transform=axes.transAxes, ha="center")
     for row, method in enumerate(methods):
         certificate = ladder.certificates[method]
         bound = certificate.acceleration_bound
@@ -61,14 +71,14 @@ def _draw_bounds(axes: Axes, ladder: Ladder) -> None:
     )
 
 
-def _draw_attack(axes: Axes, ladder: Ladder, attack: AttackResult) -> None:
+def _draw_attack(axes: Axes, ladder: Ladder, attack: AttackResult, tightest: Certificate) -> None:
     sigma, coordinate = attack.sigma, ladder.linear.coordinates.index(attack.coordinate)
-    certified = ladder.tightest.resulting_acceleration / attack.limits.forward_m_s2
+    certified = tightest.resulting_acceleration / attack.limits.forward_m_s2
     time_s = attack.timestep_s * np.arange(1, len(attack.inputs) + 1)
     axes.axhspan(-sigma, sigma, color="#e8f3ec")
     for scale, colour, label in (
         (1.0, _RED, f"smallest bound broken, {attack.violating_bound:.3g} m/s²"),
-        (certified, _COLOURS["linear"], f"same input at the {ladder.tightest.method} bound"),
+        (certified, _COLOURS["linear"], f"same input at the {tightest.method} bound"),
     ):
         swing = _response(ladder, attack, scale)[:, coordinate]
         axes.plot(time_s, swing, color=colour, linewidth=1.1, label=label)

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.certification.filter_table import filter_numbers, filter_remarks
 from defmanip_gym.certification.ladder import Ladder
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS, PHASE_PLANE, Certificate
 from defmanip_gym.theory.certificates.conditions import EXACT_PARAMETERS
@@ -53,6 +54,12 @@ def ladder_table(ladder: Ladder) -> Table:
 def remarks(ladder: Ladder) -> list[str]:
     """Return what has to be said beside the table."""
     certificate = ladder.tightest
+    if certificate is None:
+        return [
+            "No bound on the acceleration holds for ever: a small periodic motion drives an "
+            "undamped object to any swing.",
+            *filter_remarks(ladder),
+        ]
     lines = [
         f"Each internal coordinate stays within σ = {certificate.sigma_rad:.4g} under "
         f"{_conditions(ladder)}.",
@@ -70,12 +77,11 @@ def remarks(ladder: Ladder) -> list[str]:
             f"{attack.coordinate}, {attack.cpu_seconds:.0f} s)."
         )
         if attack.is_broken:
-            lines.append(_broken_remark(ladder))
-    return lines
+            lines.append(_broken_remark(certificate, ladder.withstanding))
+    return [*lines, *filter_remarks(ladder)]
 
 
-def _broken_remark(ladder: Ladder) -> str:
-    broken, lowered = ladder.tightest, ladder.withstanding
+def _broken_remark(broken: Certificate, lowered: Certificate | None) -> str:
     words = [
         f"[bold red]BROKEN[/]: {broken.method} is no certificate for this object. Its bound of "
         f"{broken.acceleration_bound:.4g} m/s² is proven for {PROOFS[broken.proof]} alone; do not "
@@ -93,13 +99,12 @@ def _broken_remark(ladder: Ladder) -> str:
 
 def numbers(config: CertifyConfig, ladder: Ladder) -> dict[str, Any]:
     """Return everything as JSON values."""
-    tightest = ladder.tightest
     return {
         "command": config.command,
         "version": __version__,
-        "sigma": tightest.sigma_rad,
+        "sigma": ladder.sigma,
         "conditions": vars(ladder.conditions),
-        "intervals": vars(tightest.intervals),
+        "intervals": vars(config.intervals),
         "coordinates": list(ladder.linear.coordinates),
         "equilibrium": ladder.linear.equilibrium.tolist(),
         "resonant_limit_m_s2": ladder.resonant_limit,
@@ -108,6 +113,7 @@ def numbers(config: CertifyConfig, ladder: Ladder) -> dict[str, Any]:
             for method, certificate in ladder.certificates.items()
         },
         "refusals": ladder.refusals,
+        "filters": filter_numbers(ladder),
         "attack": _attack_numbers(ladder),
     }
 
@@ -128,12 +134,12 @@ def _certificate_numbers(ladder: Ladder, certificate: Certificate) -> dict[str, 
 
 
 def _attack_numbers(ladder: Ladder) -> dict[str, Any] | None:
-    attack = ladder.attack
-    if attack is None:
+    attack, tightest = ladder.attack, ladder.tightest
+    if attack is None or tightest is None:
         return None
     violating = attack.violating_bound
     return {
-        "on": ladder.tightest.method,
+        "on": tightest.method,
         "peak_share_of_sigma": attack.peak_at_bound / attack.sigma,
         "violating_bound_m_s2": violating if math.isfinite(violating) else None,
         "method": attack.method,
@@ -144,6 +150,8 @@ def _attack_numbers(ladder: Ladder) -> dict[str, Any] | None:
 
 
 def _refusal(ladder: Ladder, method: str) -> str:
+    if ladder.tightest is None:
+        return "needs damping"
     if method == PHASE_PLANE and ladder.tightest.nonlinear_limit is None:
         return "needs a beam"
     return "no room left"

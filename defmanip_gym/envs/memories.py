@@ -61,7 +61,9 @@ def give_memory(layer: Any, memory: Mapping[str, Any]) -> None:
         if _is_part(value := getattr(layer, name)):
             give_memory(value, kept)
         else:
-            setattr(layer, name, copy.deepcopy(kept))
+            given = copy.deepcopy(kept)
+            # in a file named tuples become lists
+            setattr(layer, name, type(value)._make(given) if hasattr(value, "_make") else given)
 
 
 def _is_part(value: Any) -> bool:

@@ -34,8 +34,8 @@ _SCORING_OUTPUT = Path("results/agents")
 
 
 def contestant_name(family: str, card: AgentCard) -> str:
-    """Return who a card's scores are of: the agent under a certificate if it learned under one."""
-    return family if card.certificate is None else f"{family}/{card.certificate}"
+    """Return who a card's scores are of: the agent inside what it was trained inside, if any."""
+    return family if card.trained_inside is None else f"{family}/{card.trained_inside}"
 
 
 def suite_score(records: Sequence[EpisodeRecord]) -> SuiteScore:
@@ -119,7 +119,7 @@ def _scores(
 ) -> dict[str, SuiteScore]:
     """Return an agent's scores by suite, empty if it did not take part."""
     card, folder = actor.card, RecordFolder(results / RECORD_FOLDER)
-    protection = protection_named(card.certificate or "", certificates)
+    protection = protection_named(card.trained_inside or "", certificates)
     is_residual = card.residual_authority_m_s2 is not None
     controller = Learned(actor, protection.certificate if is_residual and protection else None)
     scores = {}

@@ -21,6 +21,7 @@ from defmanip_gym.evaluation.contestants import (
     standard_contestants,
     standard_names,
 )
+from defmanip_gym.evaluation.filter_timings import FILTER_TIMING_FILE, measured_filter_times
 from defmanip_gym.evaluation.outputs import print_results, write_outputs
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.evaluation.records import EpisodeRecord
@@ -57,6 +58,8 @@ def run_comparison(config: ComparisonConfig) -> Path:
         with _exclusive(config.output):
             records = _complete_records(config, contestants, console)
             measured_timings(config.output / TIMING_FILE, contestants)
+            protections = [c.protection for c in contestants if c.protection is not None]
+            measured_filter_times(config.output / FILTER_TIMING_FILE, protections)
             summaries, report = write_outputs(config, contestants, records)
     except KeyboardInterrupt:
         console.print(
@@ -159,6 +162,7 @@ def _plan(
 
 def _discard(output: Path) -> None:
     """Delete what comparisons keep between runs, and nothing else."""
-    for pattern in (f"{RECORD_FOLDER}/*/*.jsonl", f"{TRACE_FOLDER}/*/*.npz", TIMING_FILE):
+    kept = (f"{RECORD_FOLDER}/*/*.jsonl", f"{TRACE_FOLDER}/*/*.npz", TIMING_FILE)
+    for pattern in (*kept, FILTER_TIMING_FILE):
         for path in output.glob(pattern):
             path.unlink()

@@ -46,6 +46,12 @@ class Contestant:
     protection: Protection | None = None
 
     @property
+    def name_alone(self) -> str:
+        """Its name without the filter."""
+        method = "" if self.protection is None else self.protection.method
+        return self.name.removesuffix(f"/{method}")
+
+    @property
     def certificate(self) -> Certificate | None:
         """The certificate that is enforced, if the filter is one."""
         return None if self.protection is None else self.protection.certificate

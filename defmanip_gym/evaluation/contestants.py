@@ -61,7 +61,7 @@ def standard_names() -> tuple[str, ...]:
 
 def _shown(family: str) -> tuple[str, ...]:
     """Return a family's names: alone, inside the filter, inside what it learned in."""
-    trained_in = load_family(family)[0].card.certificate
+    trained_in = load_family(family)[0].card.trained_inside
     options = (
         (FILTER_OPTION,) if trained_in in (None, FILTER_OPTION) else (FILTER_OPTION, trained_in)
     )

@@ -28,9 +28,10 @@ class Course:
         requested: the controller's action, clipped to [-1, 1], (K, 3).
         applied: the one that took effect, after certificate and delay, (K, 3).
         reward: (K,).
-        intervened: whether the certificate changed the action, (K,); None without certificate.
-        intervention_m_s2: by how much, (K,); None without certificate.
-        certificate_applies: whether it covered the episode to its end; None without certificate.
+        intervened: whether the filter changed the action, (K,); None without filter.
+        intervention_m_s2: by how much, (K,); None without filter.
+        forward_correction_m_s2: what it added to the forward command, (K,); None without filter.
+        certificate_applies: whether it covered the episode to its end; None without filter.
         reached_goal: whether the last moment is a success.
         left_workspace: whether it is outside of the workspace.
         simulation_failed: whether the simulation diverged.
@@ -47,6 +48,7 @@ class Course:
     reward: Array
     intervened: Array | None
     intervention_m_s2: Array | None
+    forward_correction_m_s2: Array | None
     certificate_applies: bool | None
     reached_goal: bool
     left_workspace: bool
@@ -116,6 +118,10 @@ class CourseRecorder:
             info: at its end.
         """
         values = {"requested": requested, "applied": applied, "reward": reward, **info}
+        if self._applies is not None:
+            change = info["applied_action"] - info["wished_action"]
+            limit = self._engine.config.task.max_acceleration_m_s2
+            values["forward_correction_m_s2"] = limit * change[:, 0]
         for name, kept in self._periods.items():
             kept[:, self._steps] = values[_INTERVENTIONS.get(name, name)]
         self._steps += 1
@@ -147,8 +153,12 @@ class CourseRecorder:
         self._moments["swing_rate_rad_s"][:, k] = plant.swing_rate
 
 
-# by their names in info, inside a safety filter only
-_INTERVENTIONS = {"intervened": "intervened", "intervention_m_s2": "correction_m_s2"}
+# by their names in info, or in what is made of it, inside a safety filter only
+_INTERVENTIONS = {
+    "intervened": "intervened",
+    "intervention_m_s2": "correction_m_s2",
+    "forward_correction_m_s2": "forward_correction_m_s2",
+}
 _END_FLAGS = {
     "reached_goal": "is_success",
     "left_workspace": "left_workspace",

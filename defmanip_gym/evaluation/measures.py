@@ -16,6 +16,7 @@ from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.control.control_laws import limit_speed
 from defmanip_gym.theory.payload.object_model import HangingBeam
+from defmanip_gym.wrappers.filtering import ROUNDING_M_S2
 
 Array = NDArray[np.float64]
 
@@ -72,6 +73,8 @@ def episode_record(
         path_length_m=float(_norm(path).sum()),
         interventions=_mean(course.intervened),
         mean_intervention_m_s2=_mean(course.intervention_m_s2),
+        largest_correction_m_s2=_largest(course.intervention_m_s2),
+        correction_reversals_per_s=_reversal_rate(course.forward_correction_m_s2, duration_s),
         certificate_applies=course.certificate_applies,
         return_=float(course.reward.sum()),
     )
@@ -116,3 +119,15 @@ def _norm(vectors: Array) -> Array:
 
 def _mean(values: Array | None) -> float | None:
     return None if values is None else float(values.mean())
+
+
+def _largest(values: Array | None) -> float | None:
+    return None if values is None else float(values.max())
+
+
+def _reversal_rate(corrections: Array | None, duration_s: float) -> float | None:
+    """Return how often a second a correction has another sign than the last one had."""
+    if corrections is None:
+        return None
+    signs = np.sign(corrections[np.abs(corrections) > ROUNDING_M_S2])
+    return float(np.count_nonzero(np.diff(signs)) / duration_s)

@@ -9,14 +9,22 @@ from importlib.metadata import version
 from pathlib import Path
 
 from rich.console import Console
+from rich.table import Table
 
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestant import Contestant
+from defmanip_gym.evaluation.filter_timings import FILTER_TIMING_FILE, read_filter_times
 from defmanip_gym.evaluation.records import EpisodeRecord
-from defmanip_gym.evaluation.report.exports import latex_table, markdown_table, write_csv
+from defmanip_gym.evaluation.report.exports import (
+    latex_filter_table,
+    latex_table,
+    markdown_filter_table,
+    markdown_table,
+    write_csv,
+)
 from defmanip_gym.evaluation.report.page import Section, Setting, write_page
 from defmanip_gym.evaluation.report.section_builder import SectionBuilder
-from defmanip_gym.evaluation.report.terminal import terminal_table
+from defmanip_gym.evaluation.report.terminal import filter_terminal_table, terminal_table
 from defmanip_gym.evaluation.suites import HORIZON_S, suite_named
 from defmanip_gym.evaluation.timings import TIMING_FILE, read_timings
 from defmanip_gym.files import write_atomically
@@ -41,6 +49,7 @@ def write_outputs(
         made_by=config.command,
         contestants=contestants,
         timings=read_timings(config.output / TIMING_FILE),
+        filter_times=read_filter_times(config.output / FILTER_TIMING_FILE),
     )
     sections = tuple(
         builder.build(suite, [record for record in records if record.suite == suite.name])
@@ -49,11 +58,8 @@ def write_outputs(
     )
     write_csv(config.output / TABLE_FILE, {section.suite: section.rows for section in sections})
     for section in sections:
-        stem = config.output / TABLE_FOLDER / section.suite
-        markdown = markdown_table(section.rows, config.command)
-        latex = latex_table(section.suite, section.rows, config.command)
-        write_atomically(stem.with_suffix(".md"), markdown.encode("utf-8"))
-        write_atomically(stem.with_suffix(".tex"), latex.encode("utf-8"))
+        for name, table in _tables(section, config.command).items():
+            write_atomically(config.output / TABLE_FOLDER / name, table.encode("utf-8"))
     report = config.output / REPORT_FILE
     write_page(
         report,
@@ -68,16 +74,35 @@ def write_outputs(
 def print_results(console: Console, sections: Sequence[Section], report: Path) -> None:
     """Print each suite's table and claims, and where the report is."""
     for section in sections:
-        table = terminal_table(section.suite, section.rows)
-        # rather long lines than cells cut off, also where the output is not a terminal
-        unlimited = console.options.update(max_width=500)
-        needed = console.measure(table, options=unlimited).maximum
-        wide = Console(file=console.file, width=max(needed, console.width))
-        wide.print(table)
+        _print_whole(console, terminal_table(section.suite, section.rows))
+        if section.filters:
+            _print_whole(console, filter_terminal_table(section.suite, section.filters))
         for claim in section.claims:
             console.print(claim.text, highlight=False, markup=False)
         console.print()
     console.print(f"Report: {report.resolve()}", soft_wrap=True, highlight=False)
+
+
+def _tables(section: Section, command: str) -> dict[str, str]:
+    """Return a suite's tables by the names of their files."""
+    suite, rows, filters = section.suite, section.rows, section.filters
+    tables = {
+        f"{suite}.md": markdown_table(rows, command),
+        f"{suite}.tex": latex_table(suite, rows, command),
+    }
+    if filters:
+        tables |= {
+            f"{suite}-filters.md": markdown_filter_table(filters, command),
+            f"{suite}-filters.tex": latex_filter_table(suite, filters, command),
+        }
+    return tables
+
+
+def _print_whole(console: Console, table: Table) -> None:
+    """Print rather long lines than cells cut off, also where the output is not a terminal."""
+    unlimited = console.options.update(max_width=500)
+    needed = console.measure(table, options=unlimited).maximum
+    Console(file=console.file, width=max(needed, console.width)).print(table)
 
 
 def _settings() -> list[Setting]:

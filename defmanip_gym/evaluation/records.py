@@ -44,11 +44,13 @@ class EpisodeRecord:
             command that took effect.
         energy_j: ∫|F·v| dt of the grasp force on the object and the grasp velocity.
         path_length_m: of the grasp.
-        interventions: share of steps in which the ν_max wrapper changed the command; None
-            without wrapper.
-        mean_intervention_m_s2: mean change of the command over all steps; None without wrapper.
-        certificate_applies: whether all that the certificate takes for granted held to the end,
-            as the wrapper tells; None without wrapper.
+        interventions: share of steps in which the filter changed the command; None without one.
+        mean_intervention_m_s2: mean change of the command over all steps; None without filter.
+        largest_correction_m_s2: its largest change; None without filter.
+        correction_reversals_per_s: how often a second the change of the forward command had
+            another sign than the change before it, unchanged steps left out; None without filter.
+        certificate_applies: whether all that the filter takes for granted held to the end, as the
+            wrapper tells; None without filter.
         return_: undiscounted sum of rewards.
         package_version: of defmanip_gym.
         env_id: of the environment.
@@ -77,6 +79,8 @@ class EpisodeRecord:
     path_length_m: float
     interventions: float | None
     mean_intervention_m_s2: float | None
+    largest_correction_m_s2: float | None
+    correction_reversals_per_s: float | None
     certificate_applies: bool | None
     return_: float
     package_version: str = __version__

@@ -15,7 +15,7 @@ from defmanip_gym.files import write_atomically
 from defmanip_gym.version import __version__
 
 FORMAT = "defmanip_gym records"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 _REPEAT = "Delete this file to have its episodes run again; the others are kept."
 

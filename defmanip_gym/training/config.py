@@ -9,6 +9,7 @@ from typing import Literal, get_args
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
+from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 from defmanip_gym.validation import MOST_WORKERS, require_choice, require_whole, settle
 
 Recipe = Literal["ppo", "sac", "tqc", "residual", "lagrangian"]
@@ -28,6 +29,8 @@ class TrainConfig:
         python train.py --algo residual --seed 3
 
         python train.py --algo ppo --env DeformTransportRandomized-v0
+
+        python train.py --algo sac --filter storage
 
         python train.py --algo sac --certificate l1
 
@@ -51,6 +54,10 @@ class TrainConfig:
     """Train inside NuMaxActionScaling with this certificate for the true beam; residual has its
     own."""
 
+    filter: str | None = None
+    """Train inside this safety filter, such as storage, made for the true beam (or all that are
+    drawn) and robot; not together with a certificate."""
+
     resume: Path | None = None
     """Run folder to continue; every other option but --total-timesteps is taken from it."""
 
@@ -72,15 +79,11 @@ class TrainConfig:
     def __post_init__(self) -> None:
         require_choice("algo", self.algo, get_args(Recipe))
         require_choice("env", self.env, (*ENV_IDS, *(f"defmanip_gym:{id_}" for id_ in ENV_IDS)))
-        if self.algo == "residual" and self.certificate is not None:
-            raise ParameterError(
-                "certificate",
-                self.certificate,
-                "none with --algo residual",
-                "Its hyperparameter file names the certificate.",
-            )
         if self.certificate is not None:
             require_choice("certificate", self.certificate, get_args(Method))
+        if self.filter is not None:
+            require_choice("filter", self.filter, tuple(STORAGE_FILTERS))
+        self._require_one_protection()
         if self.total_timesteps is not None:
             settle(self, "total_timesteps", require_whole, 1)
         settle(self, "seed", require_whole, 0)
@@ -94,6 +97,28 @@ class TrainConfig:
                 f"0 <= seed < {FIRST_EVALUATION_SEED}",
                 "Seeds above are kept for evaluation.",
             )
+
+    def _require_one_protection(self) -> None:
+        """Raise ParameterError if a certificate or filter is asked for beside another."""
+        if self.algo == "residual" and self.trained_inside is not None:
+            raise ParameterError(
+                "certificate" if self.certificate is not None else "filter",
+                self.trained_inside,
+                "none with --algo residual",
+                "Its hyperparameter file names the certificate.",
+            )
+        if self.certificate is not None and self.filter is not None:
+            raise ParameterError(
+                "filter",
+                self.filter,
+                f"none beside --certificate {self.certificate}",
+                "Train inside one of them: what one allows, the other would change.",
+            )
+
+    @property
+    def trained_inside(self) -> str | None:
+        """Name of the certificate or filter around the training, or None."""
+        return self.filter if self.certificate is None else self.certificate
 
     @property
     def env_id(self) -> str:

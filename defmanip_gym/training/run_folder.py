@@ -42,8 +42,8 @@ class RunFolder:
         Raises:
             RunFolderError: the output folder cannot be written.
         """
-        certificate = f"-{config.certificate}" if config.certificate else ""
-        name = f"{config.env.split(':')[-1]}-{config.algo}{certificate}-seed{config.seed}"
+        inside = f"-{config.trained_inside}" if config.trained_inside else ""
+        name = f"{config.env_id}-{config.algo}{inside}-seed{config.seed}"
         try:
             config.output.mkdir(parents=True, exist_ok=True)
             temporary = Path(tempfile.mkdtemp(dir=config.output, prefix=".creating-"))

@@ -93,7 +93,7 @@ def _finished(path: Path) -> _Finished:
             "a commit without changes",
             "Nobody could repeat this run: commit, and train again.",
         )
-    parts = [agent.card.recipe, stored.train.certificate]
+    parts = [agent.card.recipe, stored.train.trained_inside]
     if agent.card.env_id == RANDOMIZED_ENV_ID:
         parts.append("randomized")
     return _Finished(path=path, agent=agent, family="-".join(filter(None, parts)))

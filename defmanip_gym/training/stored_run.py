@@ -42,6 +42,8 @@ class StoredRun:
         for name in ("command", "package_version", "git_revision"):
             require_instance(name, content[name], str)
         train = content["train"]
+        if isinstance(train, Mapping):
+            train = {"filter": None, **train}  # runs that began before there were filters
         _require_keys("train", train, TrainConfig)
         require_instance("output", train["output"], str)
         elsewhere = {"output": Path(train["output"]), "resume": None, "hyperparameters": None}

@@ -130,6 +130,7 @@ def export(
         package_version=started.package_version,
         git_revision=started.git_revision,
         certificate=residual.certificate if residual else config.certificate,
+        safety_filter=config.filter,
     )
     to_actor(model, card, observation_statistics(venv)).save(folder.path / name)
 

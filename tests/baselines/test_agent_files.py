@@ -113,6 +113,8 @@ def test_families_without_members_or_with_strangers_are_refused(library):
         {"squashed": 1},
         {"hyperparameters": []},
         {"certificate": "none"},
+        {"safety_filter": "nu_max"},
+        {"safety_filter": "storage", "certificate": "l1"},
         {"residual_authority_m_s2": 1.0},
         {"residual_authority_m_s2": float("nan"), "certificate": "l1"},
         {"normalization": {"clip": 0}},

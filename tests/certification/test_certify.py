@@ -7,6 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from defmanip_gym.attack import certificate as certificate_module
 from defmanip_gym.attack.result import AttackResult
@@ -16,11 +17,17 @@ from defmanip_gym.certification import table
 from defmanip_gym.certification.command import run_certify
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import compute_ladder
+from defmanip_gym.certification.phase_plot import draw_phase, has_phase_plane
 from defmanip_gym.cli import main
 from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError
+from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 HOSE = str(files("defmanip_gym.objects") / "examples" / "hose.xml")
+ONE_HINGE = """<mujoco><worldbody><body><site name="grasp"/><geom size=".03" mass=".5"/><body>
+    <joint axis="0 -1 0" damping=".1"/><geom size=".05" pos="0 0 -.3" mass="1"/></body></body>
+    </worldbody></mujoco>"""
 
 
 def ladder(**options):
@@ -40,16 +47,84 @@ def test_the_papers_beam_gets_the_whole_ladder_attacked(tmp_path, capsys):
     assert (tmp_path / "ladder.png").stat().st_size > 10_000
 
 
+def test_filters_are_told_beside_the_bounds(tmp_path, capsys):
+    run_certify(CertifyConfig(attack=False, output=tmp_path))
+    written = json.loads((tmp_path / "certificates.json").read_text())["filters"]["storage"]
+    mass, length = CertifyConfig().mass, CertifyConfig().length
+    lowest = mass * GRAVITY_M_S2 * length / 2 * (1 - math.cos(math.pi / 6))
+    assert written["pass_j"] == pytest.approx(lowest)
+    made = StorageFilter()
+    assert written["level_share"] == made.level_share and written["at_sigma"] == "segment 1"
+    swing = math.acos(1 - made.level_share * (1 - math.cos(made.sigma_rad)))
+    assert written["amplitude_share_of_sigma"] == pytest.approx(swing / made.sigma_rad, abs=2e-3)
+    printed = capsys.readouterr().out
+    assert "segment 1" in printed and f"{100 * made.level_share:.1f}" in printed
+
+
+@pytest.mark.parametrize(
+    "beam", [{}, {"segments": 2, "joint_damping": 0.0}], ids=["one hinge", "two"]
+)
+def test_of_an_undamped_beam_filters_alone_are_told(beam, tmp_path, capsys):
+    run_certify(CertifyConfig(damping=0.0, output=tmp_path, **beam))
+    written = json.loads((tmp_path / "certificates.json").read_text())
+    assert written["certificates"] == {} and written["attack"] is None
+    assert "add damping" in written["refusals"]["l1"]
+    assert written["filters"]["storage"]["level_share"] > 0.9
+    printed = capsys.readouterr().out
+    assert "No bound on the acceleration" in printed and "needs damping" in printed
+    assert (tmp_path / "ladder.png").stat().st_size > 5_000
+
+
+def test_of_many_segments_the_one_at_the_pass_is_named():
+    line, *_ = ladder(segments=4, attack=False).filters
+    assert line.coordinate == "segment 4" and line.amplitude_rad is None
+    assert line.pass_j < ladder(attack=False).filters[0].pass_j
+
+
+def test_a_filter_without_room_says_why(capsys, tmp_path):
+    run_certify(CertifyConfig(sigma=0.002, attack=False, output=tmp_path))
+    written = json.loads((tmp_path / "certificates.json").read_text())["filters"]["storage"]
+    assert written["level_share"] is None and "errors" in written["refusal"]
+    assert "No storage filter" in capsys.readouterr().out
+
+
+def test_sets_of_one_hinge_are_drawn_within_sigma():
+    axes = Figure().subplots()
+    draw_phase(axes, ladder(attack=False))
+    kept, *_, reached = (patch.get_xy() for patch in axes.patches)
+    assert 0.9 < np.abs(kept[:, 0]).max() < 1.0
+    assert 0.99 < np.abs(reached[:, 0]).max() < 1.0 + 1e-6
+    labels = axes.get_legend_handles_labels()[1]
+    assert any("storage" in text for text in labels) and any("phase_plane" in t for t in labels)
+    assert not has_phase_plane(ladder(segments=2, attack=False))
+
+
+def test_of_a_file_the_pass_is_told_as_found_by_a_search(tmp_path, capsys):
+    run_certify(CertifyConfig(mjcf=HOSE, attack=False, output=tmp_path))
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "proves nothing; no environment carries one yet" in printed
+    written = json.loads((tmp_path / "certificates.json").read_text())
+    (line,) = written["filters"].values()
+    assert line["at_sigma"] in written["coordinates"] and line["proof"] == "none"
+    assert 0 < line["level_share"] < 1 and line["pass_j"] > 0
+
+
+def test_of_an_undamped_object_from_a_file_the_filter_alone_is_told(tmp_path):
+    path = tmp_path / "pendulum.xml"
+    path.write_text(ONE_HINGE.replace('damping=".1"', ""))
+    one = ladder(mjcf=path, attack=False)
+    assert one.tightest is None
+    swing = 0.3 * 9.81 * (1 - math.cos(math.pi / 6))  # 1 kg at 0.3 m
+    assert one.filters[0].pass_j == pytest.approx(swing, rel=1e-3)
+    with pytest.raises(CertificateError, match="add damping"):
+        ladder(mjcf=path, attack=False, initial_swing=0.6)
+
+
 def test_a_model_file_is_certified_by_name_of_its_grasp_site():
     hose = ladder(mjcf=HOSE, attack=False)
     assert hose.tightest.method == "l1"
     assert "phase_plane" not in hose.certificates
     assert {certificate.proof for certificate in hose.certificates.values()} == {"none", "linear"}
-
-
-ONE_HINGE = """<mujoco><worldbody><body><site name="grasp"/><geom size=".03" mass=".5"/><body>
-    <joint axis="0 -1 0" damping=".1"/><geom size=".05" pos="0 0 -.3" mass="1"/></body></body>
-    </worldbody></mujoco>"""
 
 
 def test_of_a_file_with_one_hinge_it_says_why_phase_plane_does_not_serve(tmp_path, capsys):
@@ -138,7 +213,7 @@ def test_methods_without_room_are_left_out_with_their_reason():
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        ({"damping": 0.0}, CertificateError),
+        ({"damping": 0.0, "initial_swing": 0.6}, CertificateError),
         ({"initial_swing": 0.6}, CertificateError),
         ({"mjcf": "missing.xml"}, ObjectFileError),
         ({"mjcf": HOSE, "grasp_site": "nowhere"}, ObjectFileError),
@@ -154,7 +229,7 @@ def test_what_cannot_be_certified_is_refused_in_words(options, error):
 
 
 def test_wrong_options_end_without_a_traceback(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["defmanip", "certify", "--damping", "0", "--no-attack"])
+    monkeypatch.setattr(sys, "argv", ["defmanip", "certify", "--segments", "0", "--no-attack"])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2

@@ -18,9 +18,12 @@ from defmanip_gym.errors import ParameterError, StateError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams
 from defmanip_gym.plant import names
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.theory.filters.conditions import FilterConditions
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.training.state_file import read_state, write_state
 from defmanip_gym.wrappers.action_delay import ActionDelay
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling, NuMaxVectorActionScaling
+from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper, SafetyFilterWrapper
 
 CERTIFICATE = certify(BeamParams(), conditions=TRANSPORT_CONDITIONS)
 NOISY = DisturbanceParams(
@@ -112,6 +115,8 @@ def test_copies_and_pickles_go_on_in_the_middle_of_an_episode(copied, make_batch
         NuMaxActionScaling(gymnasium.make(ENV_ID), CERTIFICATE),
         make_batch(4, autoreset_mode="NextStep", max_episode_steps=30),
         NuMaxVectorActionScaling(make_batch(4), CERTIFICATE),
+        SafetyFilterWrapper(gymnasium.make(ENV_ID), StorageFilter()),
+        SafetyFilterVectorWrapper(make_batch(4), StorageFilter()),
     ):
         env.reset(seed=3)
         episodes(env, 20, seed=3)
@@ -201,17 +206,28 @@ def test_a_wrapper_that_cannot_be_copied_is_told_how_to_say_what_it_remembers():
     assert env.count == 4
 
 
-def test_states_of_the_packages_wrappers_go_to_disk_without_pickle(make_batch, tmp_path):
+@pytest.mark.parametrize(
+    "wrapped",
+    [
+        ResidualVectorAction,
+        lambda env: SafetyFilterVectorWrapper(env, StorageFilter()),
+        lambda env: SafetyFilterVectorWrapper(
+            env, StorageFilter(conditions=FilterConditions(swing_noise_rad=0.01, delay_periods=1))
+        ),
+    ],
+    ids=["residual", "storage", "storage with noise and delay"],
+)
+def test_states_of_the_packages_wrappers_go_to_disk_without_pickle(wrapped, make_batch, tmp_path):
     def made():
         arguments = {"num_envs": 3, "autoreset_mode": "SameStep", "disturbance": NOISY}
-        return ResidualVectorAction(make_batch(**arguments, max_episode_steps=30))
+        return wrapped(make_batch(**arguments, max_episode_steps=30))
 
     env, other = made(), made()
     env.reset(seed=1)
     episodes(env, 20)
     write_state(tmp_path, get_state(env))
     set_state(other, read_state(tmp_path))
-    assert episodes(other, 20) == episodes(env, 20)
+    assert episodes(other, 20) == episodes(env, 20)  # on into the next episodes
 
 
 def test_a_simulation_that_failed_goes_on_having_failed(make_batch):

@@ -35,6 +35,8 @@ _RECORD = EpisodeRecord(
     path_length_m=10.5,
     interventions=None,
     mean_intervention_m_s2=None,
+    largest_correction_m_s2=None,
+    correction_reversals_per_s=None,
     certificate_applies=None,
     return_=20.0,
 )

@@ -84,6 +84,8 @@ def _episode(score: float, **names: object) -> EpisodeRecord:
     of_wrapper = {
         "interventions": 0.2 if wrapped else None,
         "mean_intervention_m_s2": 0.05 if wrapped else None,
+        "largest_correction_m_s2": 0.5 if wrapped else None,
+        "correction_reversals_per_s": 1.5 if wrapped else None,
         "certificate_applies": True if wrapped else None,
     }
     if score == 0.0:

@@ -149,6 +149,8 @@ def test_nothing_but_whole_files_is_left(comparison):
         "report.html",
         "tables/nominal.md",
         "tables/nominal.tex",
+        "tables/nominal-filters.md",
+        "tables/nominal-filters.tex",
     }
     assert all(name.endswith(".png") for name in names if name.startswith("plots/"))
 

@@ -89,6 +89,15 @@ def test_incomplete_hyperparameters_are_refused_and_leave_nothing(config, tmp_pa
 def test_residual_learns_in_its_own_certificate_only():
     with pytest.raises(ParameterError, match="certificate"):
         TrainConfig(algo="residual", certificate="l1")
+    with pytest.raises(ParameterError, match="filter is 'storage'"):
+        TrainConfig(algo="residual", filter="storage")
+
+
+def test_a_run_learns_inside_one_filter_only():
+    with pytest.raises(ParameterError, match="none beside --certificate l1"):
+        TrainConfig(certificate="l1", filter="storage")
+    with pytest.raises(ParameterError, match="filter"):
+        TrainConfig(filter="nu_max")
 
 
 def test_bad_runs_are_refused_by_name(config, tmp_path):
@@ -130,6 +139,7 @@ def test_damaged_checkpoint_is_refused_by_name(config):
         {"train": {"total_timesteps": "a"}},
         {"train": {"seed": 0.5}},
         {"train": {"certificate": 3}},
+        {"train": {"filter": 3}},
     ],
 )
 def test_a_damaged_configuration_is_refused_by_name(damage, folder):

@@ -115,6 +115,13 @@ def test_a_run_goes_on_after_ctrl_c_as_if_nothing_had_been(algo, step, settings,
     assert differences(folder, given) == []
 
 
+def test_a_run_inside_a_filter_goes_on_as_if_nothing_had_been(settings, interrupted):
+    given = replace(settings("ppo"), filter="storage")
+    folder, _ = interrupted(given, 300, ctrl_c)
+    training.train(TrainConfig(resume=folder))
+    assert differences(folder, given) == []
+
+
 def train_and_die(settings):
     training.Checkpoints = disturbed(400, die)
     training.train(settings)

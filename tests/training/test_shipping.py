@@ -31,12 +31,13 @@ ROOT = Path(__file__).parents[2]
 def run(tmp_path):
     """Make run folders as training leaves them."""
 
-    def make(seed=0, *, steps=100, certificate=None, **changes):
+    def make(seed=0, *, steps=100, inside=None, **changes):
+        inside = inside or {}
         path = tmp_path / "runs" / f"{len(list(tmp_path.glob('runs/*')))}"
         small_agent(seed=seed, total_timesteps=40, **changes).save(path / "agent")
         small_agent(seed=seed, total_timesteps=steps, **changes).save(path / "last")
         content = {
-            "train": asdict(TrainConfig(certificate=certificate)),
+            "train": asdict(TrainConfig(**inside)),
             "hyperparameters": load_hyperparameters(None, "ppo", ENV_ID) | {"n_timesteps": 100},
             "command": "python train.py",
             "package_version": "0.1.0",
@@ -58,11 +59,18 @@ def test_the_best_agents_of_runs_become_families(run, library):
         run(0),
         run(3),
         run(1, env_id="DeformTransportRandomized-v0"),
-        run(2, certificate="l1"),
+        run(2, inside={"certificate": "l1"}),
+        run(4, inside={"filter": "storage"}),
     )
-    names = ("ppo/seed-0", "ppo/seed-3", "ppo-randomized/seed-1", "ppo-l1/seed-2")
+    names = (
+        "ppo/seed-0",
+        "ppo/seed-3",
+        "ppo-randomized/seed-1",
+        "ppo-l1/seed-2",
+        "ppo-storage/seed-4",
+    )
     assert ship(ShipConfig(runs=runs, library=library)) == names
-    assert shipped_families(library) == ("ppo", "ppo-l1", "ppo-randomized")
+    assert shipped_families(library) == ("ppo", "ppo-l1", "ppo-randomized", "ppo-storage")
     assert [agent.card.seed for agent in load_family("ppo", library)] == [0, 3]
     for name, path in zip(names, runs, strict=True):
         for suffix in (".json", ".safetensors"):

@@ -146,6 +146,36 @@ def test_training_under_a_certificate_is_recorded(config):
     assert "l1" in folder.name
 
 
+def test_training_inside_a_filter_is_recorded_and_so_are_its_evaluations(config, monkeypatch):
+    inside = []
+
+    def evaluated(self):
+        env = self.eval_env.venv.env
+        inside.append(type(env).__name__)
+        return float(env.filtering.steps > 0 and env.filtering.applies.all())
+
+    monkeypatch.setattr(training.ValidationCallback, "_mean_score", evaluated)
+    folder = training.train(config(filter="storage"))
+    card = load_agent(folder).card
+    assert card.safety_filter == card.trained_inside == "storage" and card.certificate is None
+    assert "-ppo-storage-seed" in folder.name
+    assert inside == ["SafetyFilterVectorWrapper"] * 2
+    assert json.loads((folder / "config.json").read_text())["train"]["filter"] == "storage"
+
+
+def test_the_filter_of_a_training_knows_what_the_environment_draws_and_how_late_actions_are(config):
+    settings = config(filter="storage")
+    drawn = {"env_kwargs": {"beam_ranges": {"mass_kg": [2.8, 3.4]}}}
+    venv = make_training_env(settings, load_hyperparameters(None, "ppo", ENV_ID) | drawn)
+    filtering = venv.venv.env.filtering
+    venv.reset()
+    assert filtering.applies.all()
+    believed = filtering._filter
+    assert believed.covers(replace(believed.beam, mass_kg=2.8))
+    assert not believed.covers(replace(believed.beam, mass_kg=2.5))
+    venv.close()
+
+
 def test_half_written_checkpoints_never_appear(config, monkeypatch):
     folder = training.RunFolder(config().output)
     folder.path.mkdir()

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from defmanip_gym.envs.registration import ENV_IDS
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
+from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 
 CARD_FORMAT = 2
 ALGORITHMS = ("ppo", "sac", "tqc", "td3")
@@ -95,6 +96,7 @@ class AgentCard:
         recipe: name of the hyperparameter file.
         hyperparameters: as in that file.
         certificate: method of the certificate it was trained under, or None.
+        safety_filter: name of the filter that knows the state which it was trained inside, or None.
         command: the shell command that trained it.
         seed: of the training.
         total_timesteps: environment steps it was trained for.
@@ -119,6 +121,7 @@ class AgentCard:
     recipe: str
     hyperparameters: Mapping[str, Any]
     certificate: str | None = None
+    safety_filter: str | None = None
     command: str
     seed: int
     total_timesteps: int
@@ -145,6 +148,10 @@ class AgentCard:
         _require("squashed", self.squashed, isinstance(self.squashed, bool), "true or false")
         if self.certificate is not None:
             _require_choice("certificate", self.certificate, CERTIFICATE_METHODS)
+        if self.safety_filter is not None:
+            _require_choice("safety_filter", self.safety_filter, tuple(STORAGE_FILTERS))
+            alone = self.certificate is None
+            _require("safety_filter", self.safety_filter, alone, "null beside a certificate")
         _require(
             "hyperparameters",
             self.hyperparameters,
@@ -163,6 +170,11 @@ class AgentCard:
         )
         allowed = "null, or m/s² > 0 of an agent trained under a certificate"
         _require("residual_authority_m_s2", authority, fits, allowed)
+
+    @property
+    def trained_inside(self) -> str | None:
+        """Name of the certificate or filter that it was trained inside, or None."""
+        return self.safety_filter if self.certificate is None else self.certificate
 
     def to_text(self) -> str:
         """Return the card as JSON."""

@@ -19,6 +19,7 @@ _ALIKE = (
     "recipe",
     "hyperparameters",
     "certificate",
+    "safety_filter",
     "residual_authority_m_s2",
 )
 

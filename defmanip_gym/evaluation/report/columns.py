@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from defmanip_gym.evaluation.statistics.intervals import Estimate, Rate
 from defmanip_gym.evaluation.statistics.summary import Summary
 
 NONE = "–"
+RowT = TypeVar("RowT")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +37,7 @@ class Cell:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class Column(Generic[RowT]):
     """A column for readers.
 
     Attributes:
@@ -48,7 +50,7 @@ class Column:
     heading: str
     unit: str
     legend: str
-    cell: Callable[[Row], Cell]
+    cell: Callable[[RowT], Cell]
 
     @property
     def title(self) -> str:
@@ -98,7 +100,7 @@ def _decision(row: Row) -> Cell:
     return Cell(NONE if row.decision_time_s is None else f"{1e3 * row.decision_time_s:.2g}")
 
 
-COLUMNS = (
+COLUMNS: tuple[Column[Row], ...] = (
     Column(
         heading="Score",
         unit="IQM",

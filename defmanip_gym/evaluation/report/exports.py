@@ -6,8 +6,10 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from defmanip_gym.evaluation.report.columns import COLUMNS, NONE, Cell, Column, Row
+from defmanip_gym.evaluation.report.columns import COLUMNS, NONE, Cell, Column, Row, RowT
+from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS, FilterRow
 from defmanip_gym.evaluation.statistics.intervals import Interval
 from defmanip_gym.files import write_atomically
 
@@ -27,6 +29,7 @@ _LATEX = {
     "∫": r"$\int$",
     "−": "$-$",
     "·": r"$\cdot$",
+    "µ": r"$\mu$",
     "²": "$^2$",
     "|": "$|$",
     "<": "$<$",
@@ -50,31 +53,67 @@ def markdown_table(rows: Sequence[Row], made_by: str) -> str:
     head = ["Contestant", *(column.title for column in COLUMNS), "Knows"]
     lines = [_markdown_line(head), _markdown_line(["---", *["---:"] * len(COLUMNS), "---"])]
     for row in rows:
-        cells = [_with_note(column.cell(row), "<br>") for column in COLUMNS]
+        cells = _markdown_cells(row, COLUMNS)
         lines.append(_markdown_line([row.summary.contestant, *cells, row.privileged]))
-    return "\n".join([*lines, "", f"Made by `{made_by}`; small print: 95 % intervals.", ""])
+    return _markdown_page(lines, made_by)
+
+
+def markdown_filter_table(rows: Sequence[FilterRow], made_by: str) -> str:
+    """Return a suite's table of filters in Markdown, with the command that makes it."""
+    head = ["Filter", *(column.title for column in FILTER_COLUMNS)]
+    lines = [_markdown_line(head), _markdown_line(["---", *["---:"] * len(FILTER_COLUMNS)])]
+    for row in rows:
+        lines.append(_markdown_line([row.effect.name, *_markdown_cells(row, FILTER_COLUMNS)]))
+    return _markdown_page(lines, made_by)
 
 
 def latex_table(suite: str, rows: Sequence[Row], made_by: str) -> str:
     """Return a suite's table in LaTeX; it needs the packages booktabs and graphicx."""
-    head = " & ".join(["Contestant", *map(_latex_head, COLUMNS), "Privileged information"])
+    head = ["Contestant", *map(_latex_head, COLUMNS), "Privileged information"]
+    lines = []
+    for row in rows:
+        cells = [_latex_cell(column.cell(row)) for column in COLUMNS]
+        lines.append([_latex(row.summary.contestant), *cells, _latex(row.privileged)])
+    layout = f"l{'r' * len(COLUMNS)}p{{5cm}}"
+    return _latex_page(f"Suite {_latex(suite)}", layout, head, lines, made_by)
+
+
+def latex_filter_table(suite: str, rows: Sequence[FilterRow], made_by: str) -> str:
+    """Return a suite's table of filters in LaTeX; it needs the same packages."""
+    head = ["Filter", *map(_latex_head, FILTER_COLUMNS)]
+    lines = [
+        [_latex(row.effect.name), *(_latex_cell(column.cell(row)) for column in FILTER_COLUMNS)]
+        for row in rows
+    ]
+    layout = f"l{'r' * len(FILTER_COLUMNS)}"
+    return _latex_page(f"Filters in suite {_latex(suite)}", layout, head, lines, made_by)
+
+
+def _latex_page(
+    title: str, layout: str, head: Sequence[str], rows: Sequence[Sequence[str]], made_by: str
+) -> str:
     lines = [
         f"% Made by: {made_by}",
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{Suite {_latex(suite)}, with 95\,\% intervals. "
+        rf"\caption{{{title}, with 95\,\% intervals. "
         rf"Made by \texttt{{{_latex(made_by)}}}.}}",
         r"\resizebox{\linewidth}{!}{%",
-        rf"\begin{{tabular}}{{l{'r' * len(COLUMNS)}p{{5cm}}}}",
+        rf"\begin{{tabular}}{{{layout}}}",
         r"\toprule",
-        head + r" \\",
+        " & ".join(head) + r" \\",
         r"\midrule",
+        *(" & ".join(row) + r" \\" for row in rows),
     ]
-    for row in rows:
-        cells = [_latex_cell(column.cell(row)) for column in COLUMNS]
-        name, privileged = _latex(row.summary.contestant), _latex(row.privileged)
-        lines.append(" & ".join([name, *cells, privileged]) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}}", r"\end{table}", ""])
+
+
+def _markdown_page(lines: Sequence[str], made_by: str) -> str:
+    return "\n".join([*lines, "", f"Made by `{made_by}`; small print: 95 % intervals.", ""])
+
+
+def _markdown_cells(row: RowT, columns: Sequence[Column[RowT]]) -> list[str]:
+    return [_with_note(column.cell(row), "<br>") for column in columns]
 
 
 def _markdown_line(cells: Sequence[str]) -> str:
@@ -85,7 +124,7 @@ def _with_note(cell: Cell, separator: str) -> str:
     return f"{cell.value}{separator}{cell.note}" if cell.note else cell.value
 
 
-def _latex_head(column: Column) -> str:
+def _latex_head(column: Column[Any]) -> str:
     unit = rf"\\({_latex(column.unit)})" if column.unit else ""
     return rf"\shortstack{{{_latex(column.heading)}{unit}}}"
 

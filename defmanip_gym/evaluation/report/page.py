@@ -12,6 +12,7 @@ from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.report.animation import Animation
 from defmanip_gym.evaluation.report.columns import COLUMNS, Row
 from defmanip_gym.evaluation.report.figures import FigureGroup
+from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS, FilterRow
 from defmanip_gym.evaluation.report.sentences import Claim
 from defmanip_gym.files import write_atomically
 
@@ -27,6 +28,7 @@ class Section:
         headline: who is best, in a few words.
         claims: what may be said.
         rows: of the table.
+        filters: rows of the table of filters, none without pairs to judge them by.
         figures: in order.
         animations: in order.
     """
@@ -37,6 +39,7 @@ class Section:
     headline: str
     claims: tuple[Claim, ...]
     rows: tuple[Row, ...]
+    filters: tuple[FilterRow, ...]
     figures: tuple[FigureGroup, ...]
     animations: tuple[Animation, ...]
 
@@ -79,6 +82,7 @@ def write_page(
         contestants=contestants,
         colours={contestant.name: contestant.colour for contestant in contestants},
         columns=COLUMNS,
+        filter_columns=FILTER_COLUMNS,
         settings=settings,
         command=command,
     )

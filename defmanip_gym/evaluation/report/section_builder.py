@@ -8,13 +8,16 @@ from pathlib import Path
 
 from defmanip_gym.evaluation.analysis import SuiteAnalysis, analyse
 from defmanip_gym.evaluation.contestant import Contestant
+from defmanip_gym.evaluation.filter_timings import FilterTimes
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report.animation import Animation, animation
 from defmanip_gym.evaluation.report.columns import Row
 from defmanip_gym.evaluation.report.figures import FigureGroup, ReachableSets, SuiteFigures
+from defmanip_gym.evaluation.report.filter_columns import FilterRow
 from defmanip_gym.evaluation.report.page import Section
 from defmanip_gym.evaluation.report.selection import best_of_each_kind, pairs_to_watch
 from defmanip_gym.evaluation.report.sentences import certificate_claim, headline, suite_claims
+from defmanip_gym.evaluation.statistics.filter_effects import FilterPairs, filter_effects
 from defmanip_gym.evaluation.suites import Suite
 from defmanip_gym.evaluation.traces import TRACE_FOLDER, Trace, load_trace, trace_path
 
@@ -30,6 +33,7 @@ class SectionBuilder:
         made_by: the command that makes the comparison.
         contestants: who took part, in order.
         timings: decision times by contestant, s.
+        filter_times: of the filters alone, by their names.
         reachable: sets of the certificates, computed when needed.
     """
 
@@ -37,6 +41,7 @@ class SectionBuilder:
     made_by: str
     contestants: Sequence[Contestant]
     timings: Mapping[str, float]
+    filter_times: Mapping[str, FilterTimes]
     reachable: ReachableSets = field(default_factory=ReachableSets)
 
     def build(self, suite: Suite, records: Sequence[EpisodeRecord]) -> Section:
@@ -67,9 +72,23 @@ class SectionBuilder:
                 )
                 for summary in analysis.summaries
             ),
+            filters=tuple(
+                FilterRow(effect=effect, times=self.filter_times.get(effect.name))
+                for effect in filter_effects(records, self._judged())
+            ),
             figures=self._figures(analysis, traces, records),
             animations=self._animations(analysis, suite, traces, records),
         )
+
+    def _judged(self) -> tuple[FilterPairs, ...]:
+        """Return the filters with those inside them, in the order of the contestants."""
+        alone = {c.name for c in self.contestants if c.protection is None}
+        inside: dict[str, dict[str, str]] = {}
+        for contestant in self.contestants:
+            if contestant.protection is not None and contestant.name_alone in alone:
+                own = inside.setdefault(contestant.protection.method, {})
+                own[contestant.name] = contestant.name_alone
+        return tuple(FilterPairs(name=name, contestants=own) for name, own in inside.items())
 
     def _traces(self, suite: Suite) -> list[Trace]:
         """Return the traces that there are, contestants in order and scenarios within."""

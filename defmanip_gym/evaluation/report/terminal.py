@@ -15,6 +15,8 @@ from defmanip_gym.evaluation.report.columns import (
     rate_cell,
     share_cell,
 )
+from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS, FilterRow
+from defmanip_gym.evaluation.statistics.intervals import Rate
 
 
 def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
@@ -39,6 +41,31 @@ def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
             NONE if decision is None else f"{1e3 * decision:.2g}",
         )
     return table
+
+
+def filter_terminal_table(suite: str, rows: Sequence[FilterRow]) -> Table:
+    """Return the table of filters; arrows lead from alone to inside."""
+    table = Table(box=box.SIMPLE_HEAD, title=f"Filters in suite {suite}", title_justify="left")
+    table.add_column("Filter", no_wrap=True, style="bold")
+    names = ("Violation %", "Success %", "Changed %", "Mean m/s²", "Max m/s²", "Flips 1/s")
+    for heading in ("Pairs", *names, "µs (p99)"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in rows:
+        effect, cells = row.effect, [column.cell(row).value for column in FILTER_COLUMNS]
+        *_, changed, mean, largest, flips, median, p99 = cells
+        table.add_row(
+            effect.name,
+            str(effect.violation_alone.trials),
+            _change(effect.violation_alone, effect.violation_inside),
+            _change(effect.success_alone, effect.success_inside),
+            *(changed, mean, largest, flips),
+            NONE if row.times is None else f"{median} ({p99})",
+        )
+    return table
+
+
+def _change(alone: Rate, inside: Rate) -> str:
+    return f"{rate_cell(alone).value} → {_on_one_line(rate_cell(inside))}"
 
 
 def _on_one_line(cell: Cell) -> str:

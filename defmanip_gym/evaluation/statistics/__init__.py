@@ -2,7 +2,7 @@
 
 Reading order: ``episode_table`` (records as arrays), ``intervals``, ``aggregates``, ``resampling``
 (the two bootstraps), ``improvement``, ``profiles``, ``scores``, ``paired``, ``verdicts``,
-``summary``, ``condition_estimates``.
+``summary``, ``condition_estimates``, ``filter_effects``.
 """
 
 from defmanip_gym.evaluation.statistics.aggregates import interquartile_mean

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -195,6 +196,10 @@ class StorageFilter(SafetyFilter):
     def specification(self) -> dict[str, Any]:
         """What the filter was made with, as JSON values."""
         return {"name": self.name} | {name: plain(getattr(self, name)) for name in self.arguments}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # machine code cannot be pickled: a copy makes its own
+        return partial(type(self), **{name: getattr(self, name) for name in self.arguments}), ()
 
     @property
     def errors_m_s2(self) -> tuple[float, float, float]:
