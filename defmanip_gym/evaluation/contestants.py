@@ -34,7 +34,7 @@ from defmanip_gym.evaluation.protection import (
 )
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import DESIGN_DAMPING
-from defmanip_gym.theory.filters.family import STORAGE_FILTERS
+from defmanip_gym.theory.filters.family import REFERENCE_FILTERS, STORAGE_FILTERS
 from defmanip_gym.validation import require_choice
 
 # The filter that every controller gets; the paper's controller shows what its own idea costs.
@@ -47,7 +47,7 @@ _ANALYTIC = (
     "tanner/tanner",
 )
 _CERTIFICATES = ("phase_plane", "l1", "tanner")
-_OPTIONS = (*STORAGE_FILTERS, *_CERTIFICATES)
+_OPTIONS = (*STORAGE_FILTERS, *REFERENCE_FILTERS, *_CERTIFICATES)
 _ACTION_SIZE = 3
 _OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance"})  # env_kwargs
 _WRAPPER_KNOWS = "the filter knows the nominal beam"
@@ -279,6 +279,11 @@ _TANNER = {
         "The paper's controller inside the backup filter: what a rollout shows to be safe",
         f"{_NOMINAL_MODEL}; {_FILTER_KNOWS}",
         "#5a6e2e",
+    ),
+    "cbf_qp": (
+        "The paper's controller inside the literature's filter: a barrier by quadratic program",
+        f"{_NOMINAL_MODEL}; {_FILTER_KNOWS}",
+        "#8a5a9e",
     ),
     "phase_plane": (
         "The paper's controller under the largest bound that the nonlinear nominal beam allows",

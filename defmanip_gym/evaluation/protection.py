@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.params import DESIGN_DAMPING, BeamRanges
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
-from defmanip_gym.theory.filters.family import STORAGE_FILTERS
+from defmanip_gym.theory.filters.family import REFERENCE_FILTERS, STORAGE_FILTERS
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
 from defmanip_gym.wrappers.filter_for import filter_for
 from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
@@ -95,7 +95,7 @@ def _storage_filter(method: str, condition: Condition) -> SafetyFilter:
         config = replace(config, beam=NOMINAL_BEAM, beam_ranges=BeamRanges(**ranges))
     return filter_for(
         config,
-        kind=STORAGE_FILTERS[method],
+        kind=(STORAGE_FILTERS | REFERENCE_FILTERS)[method],
         beam=NOMINAL_BEAM,
         delay_periods=condition.delay_periods,
     )
@@ -121,6 +121,6 @@ def protection_named(method: str, certificates: Certificates) -> Protection | No
     """Return a filter by its name, None for an empty one."""
     if not method:
         return None
-    if method in STORAGE_FILTERS:
+    if method in STORAGE_FILTERS | REFERENCE_FILTERS:
         return StorageProtection(method)
     return CertificateProtection(certificates.named(method))

@@ -8,16 +8,21 @@ from typing import Any
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.filters.backup_filter import BackupFilter
 from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
+from defmanip_gym.theory.filters.qp_filter import CbfQpFilter
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.validation import require_choice
 
-FILTERS: dict[str, type[SafetyFilter]] = {
-    kind.name: kind for kind in (NuMaxFilter, StorageFilter, BackupFilter)
-}
 # those that are made for an object with conditions and intervals
 STORAGE_FILTERS: dict[str, type[StorageFilter]] = {
     kind.name: kind for kind in (StorageFilter, BackupFilter)
+}
+# the literature's, to compare with
+REFERENCE_FILTERS: dict[str, type[StorageFilter]] = {CbfQpFilter.name: CbfQpFilter}
+FILTERS: dict[str, type[SafetyFilter]] = {
+    NuMaxFilter.name: NuMaxFilter,
+    **STORAGE_FILTERS,
+    **REFERENCE_FILTERS,
 }
 
 

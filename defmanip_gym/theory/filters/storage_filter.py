@@ -49,7 +49,6 @@ from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.filters.swing_estimate import SwingEstimate
 from defmanip_gym.validation import plain, require_params
 
-_ARGUMENTS = ("beam", "sigma_rad", "robot", "task", "conditions", "intervals")
 _LEAST_BEND_RAD = 0.6
 _LEAST_HEIGHT_SHARE = 1.5  # of the lowest grasp that ends no episode
 _EDGE_POINTS = 1001
@@ -89,6 +88,14 @@ class StorageFilter(SafetyFilter):
 
     name = "storage"
     proof: FilterProof = "nonlinear"
+    arguments: tuple[str, ...] = (
+        "beam",
+        "sigma_rad",
+        "robot",
+        "task",
+        "conditions",
+        "intervals",
+    )
 
     def __init__(
         self,
@@ -188,11 +195,11 @@ class StorageFilter(SafetyFilter):
     @property
     def specification(self) -> dict[str, Any]:
         """What the filter was made with, as JSON values."""
-        return {"name": self.name} | {name: plain(getattr(self, name)) for name in _ARGUMENTS}
+        return {"name": self.name} | {name: plain(getattr(self, name)) for name in self.arguments}
 
     def __reduce__(self) -> tuple[Any, ...]:
         # machine code cannot be pickled: a copy makes its own
-        return partial(type(self), **{name: getattr(self, name) for name in _ARGUMENTS}), ()
+        return partial(type(self), **{name: getattr(self, name) for name in self.arguments}), ()
 
     @property
     def errors_m_s2(self) -> tuple[float, float, float]:
@@ -219,7 +226,7 @@ class StorageFilter(SafetyFilter):
         return self._with(beam=beam, intervals=PayloadIntervals())
 
     def _with(self, **changes: Any) -> Self:
-        return type(self)(**{name: getattr(self, name) for name in _ARGUMENTS} | changes)
+        return type(self)(**{name: getattr(self, name) for name in self.arguments} | changes)
 
     def covers(self, beam: BeamParams) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""
