@@ -39,12 +39,12 @@ def filter_remarks(ladder: Ladder) -> list[str]:
         return told
     told.append(
         "Filters that measure the swing bound no acceleration: inside them any controller keeps "
-        f"{'every coordinate' if ladder.is_from_file else 'every segment'} within σ, damped or not."
+        f"{'every coordinate' if ladder.beam is None else 'every segment'} within σ, damped or not."
     )
     told.append(
         "Of an object from a file V_σ is the lowest pass that a search found, which proves "
         "nothing; no environment carries one yet."
-        if ladder.is_from_file
+        if ladder.beam is None
         else "The level leaves room for the default robot's errors; "
         "filter_for(env.unwrapped.config) makes it for another."
     )

@@ -44,7 +44,7 @@ class Ladder:
         withstanding: that certificate, lowered until attacks did not break it any more; None where
             it was not broken or is broken however low.
         target: the object on its rig, as attacked.
-        is_from_file: whether it is an object from a file.
+        beam: the object; None if it is from a file.
     """
 
     linear: LinearizedObject
@@ -57,7 +57,7 @@ class Ladder:
     attack: AttackResult | None
     withstanding: Certificate | None
     target: Target
-    is_from_file: bool
+    beam: BeamParams | None
 
     @property
     def tightest(self) -> Certificate | None:
@@ -140,7 +140,7 @@ def compute_ladder(config: CertifyConfig, tell: Callable[[str], None]) -> Ladder
         attack=None,
         withstanding=None,
         target=target,
-        is_from_file=thing is not None,
+        beam=deformable if isinstance(deformable, BeamParams) else None,
     )
     tightest, longest_s = ladder.tightest, config.longest_attack_s
     if not config.attack or tightest is None:

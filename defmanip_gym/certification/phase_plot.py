@@ -1,4 +1,4 @@
-"""One hinge in the phase plane: σ, what the tightest bound reaches, what filters keep."""
+"""One hinge in the phase plane: what a bound reaches, what filters keep, what is viable."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from defmanip_gym.certification.ladder import Ladder
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates.phase_plane import one_hinge_reachable_set
 from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.filters.viability import viable_set
 
 Edge = tuple[Array, Array]
 
@@ -39,10 +41,27 @@ def draw_phase(axes: Axes, ladder: Ladder) -> None:
         sets.append((label, reached, _BOUND))
     for label, edge, colour in sorted(sets, key=lambda each: _area(each[1]), reverse=True):
         _fill(axes, edge, ladder.sigma, colour, label)
+    most = _viable(ladder)
+    if most is not None:
+        angles, rates = (np.concatenate((half, -half, half[:1])) for half in most)
+        label = "viable from rest by forward acceleration alone"
+        axes.plot(angles / ladder.sigma, rates, color=_INK, linewidth=0.9, label=label)
     axes.set_xlabel("swing φ / σ")
     axes.set_ylabel("swing rate φ̇ (rad/s)")
     axes.set_xlim(-1.25, 1.25)
     axes.legend(fontsize="small", loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+
+
+def _viable(ladder: Ladder) -> Edge | None:
+    """Return the edge of what a resting grasp can keep within σ going forth; None if not known."""
+    if ladder.beam is None:
+        return None
+    try:
+        viable = viable_set(ladder.beam, sigma_rad=ladder.sigma)
+    except ParameterError:  # swings too fast or too slow for the control period
+        return None
+    at_rest = int(np.argmin(np.abs(viable.speed)))
+    return viable.swing, viable.inner[:, at_rest]
 
 
 def _area(edge: Edge) -> float:

@@ -101,6 +101,9 @@ def test_sets_of_one_hinge_are_drawn_within_sigma():
     for line in one.filters:
         (kept,) = (width for label, width in widths.items() if f"kept by {line.name}," in label)
         assert 0.9 < kept < 1.0
+    (most,) = (each.get_xydata() for each in axes.lines if "viable" in str(each.get_label()))
+    assert np.abs(most[:, 0]).max() == pytest.approx(1.0)
+    assert np.abs(most[:, 1]).max() > one.filters[0].edge[1].max()
     assert not has_phase_plane(ladder(segments=2, attack=False))
 
 

@@ -25,6 +25,7 @@ from defmanip_gym.evaluation.report.exports import latex_filter_table, markdown_
 from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS, FilterRow
 from defmanip_gym.evaluation.report.terminal import filter_terminal_table
 from defmanip_gym.evaluation.statistics.filter_effects import FilterPairs, filter_effects
+from defmanip_gym.evaluation.viable_shares import viable_share
 
 COMMAND = "python evaluate.py --output some_where"
 STORAGE = FilterPairs(name="storage", contestants={"ppo/storage": "ppo", "sac/storage": "sac"})
@@ -57,7 +58,13 @@ def rows():
         inside("ppo", "b", interventions=0.5, mean_intervention_m_s2=0.45),
     ]
     (effect,) = filter_effects(records, [STORAGE])
-    return [FilterRow(effect=effect, times=FilterTimes(median_s=2.5e-5, p99_s=1e-4))]
+    return [
+        FilterRow(
+            effect=effect,
+            times=FilterTimes(median_s=2.5e-5, p99_s=1e-4),
+            viable_share=0.5,
+        )
+    ]
 
 
 def test_rates_are_of_pairs_alone_and_inside(rows):
@@ -121,6 +128,17 @@ def test_the_terminal_table_leads_from_alone_to_inside(rows):
     Console(file=buffer, width=120).print(filter_terminal_table("nominal", rows))
     assert "50 → 0" in buffer.getvalue() and "50 → 100" in buffer.getvalue()
     assert "…" not in buffer.getvalue() and " 25" in buffer.getvalue()
+
+
+def test_what_is_kept_of_the_viable_set_is_told_where_it_is_known():
+    certificates = Certificates()
+    shares = {
+        name: viable_share(protection_named(name, certificates))
+        for name in ("storage", "backup", "l1", "tanner")
+    }
+    assert 0.4 < shares["storage"] < 0.7 and 0 < shares["l1"] < 0.7
+    assert shares["backup"] is None  # not known
+    assert shares["tanner"] is None  # of another beam
 
 
 def test_names_alone_are_without_the_filter():

@@ -16,10 +16,12 @@ class FilterRow:
     Attributes:
         effect: what it changed.
         times: how long it takes to decide; None if not measured.
+        viable_share: what of the nominal beam's viable set it keeps to; None if not known.
     """
 
     effect: FilterEffect
     times: FilterTimes | None
+    viable_share: float | None
 
 
 def _size(value: float | None) -> str:
@@ -96,6 +98,13 @@ FILTER_COLUMNS: tuple[Column[FilterRow], ...] = (
         legend="how often a second its change of the forward command had another sign than its "
         "last one",
         cell=lambda row: Cell(_size(row.effect.reversals_per_s)),
+    ),
+    Column(
+        heading="Viable",
+        unit="% of the set",
+        legend="share of the states from which forward acceleration can keep the nominal beam "
+        "within σ at all that the filter lets it come to; – where that is not known",
+        cell=lambda row: Cell(NONE if row.viable_share is None else _share(row.viable_share)),
     ),
     Column(
         heading="Decision",

@@ -20,6 +20,7 @@ from defmanip_gym.evaluation.report.sentences import certificate_claim, headline
 from defmanip_gym.evaluation.statistics.filter_effects import FilterPairs, filter_effects
 from defmanip_gym.evaluation.suites import Suite
 from defmanip_gym.evaluation.traces import TRACE_FOLDER, Trace, load_trace, trace_path
+from defmanip_gym.evaluation.viable_shares import viable_share
 
 PLOT_FOLDER = "plots"
 
@@ -72,12 +73,22 @@ class SectionBuilder:
                 )
                 for summary in analysis.summaries
             ),
-            filters=tuple(
-                FilterRow(effect=effect, times=self.filter_times.get(effect.name))
-                for effect in filter_effects(records, self._judged())
-            ),
+            filters=self._filters(records),
             figures=self._figures(analysis, traces, records),
             animations=self._animations(analysis, suite, traces, records),
+        )
+
+    def _filters(self, records: Sequence[EpisodeRecord]) -> tuple[FilterRow, ...]:
+        protections = {
+            c.protection.method: c.protection for c in self.contestants if c.protection is not None
+        }
+        return tuple(
+            FilterRow(
+                effect=effect,
+                times=self.filter_times.get(effect.name),
+                viable_share=viable_share(protections[effect.name]),
+            )
+            for effect in filter_effects(records, self._judged())
         )
 
     def _judged(self) -> tuple[FilterPairs, ...]:

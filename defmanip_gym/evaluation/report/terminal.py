@@ -47,18 +47,18 @@ def filter_terminal_table(suite: str, rows: Sequence[FilterRow]) -> Table:
     """Return the table of filters; arrows lead from alone to inside."""
     table = Table(box=box.SIMPLE_HEAD, title=f"Filters in suite {suite}", title_justify="left")
     table.add_column("Filter", no_wrap=True, style="bold")
-    names = ("Violation %", "Success %", "Changed %", "Mean m/s²", "Max m/s²", "Flips 1/s")
+    names = ("Violation %", "Success %", "Changed %", "m/s² (max)", "Flips 1/s", "Viable %")
     for heading in ("Pairs", *names, "µs (p99)"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
         effect, cells = row.effect, [column.cell(row).value for column in FILTER_COLUMNS]
-        *_, changed, mean, largest, flips, median, p99 = cells
+        *_, changed, mean, largest, flips, viable, median, p99 = cells
         table.add_row(
             effect.name,
             str(effect.violation_alone.trials),
             _change(effect.violation_alone, effect.violation_inside),
             _change(effect.success_alone, effect.success_inside),
-            *(changed, mean, largest, flips),
+            *(changed, f"{mean} ({largest})", flips, viable),
             NONE if row.times is None else f"{median} ({p99})",
         )
     return table
