@@ -134,7 +134,7 @@ def _certificates(suites: Iterable[Sequence[EpisodeRecord]]) -> str:
     covered = sum(record.certificate_applies is True for record in records)
     broken = len(broken_certificates(records))
     return (
-        f"Certificates covered {covered} of {len(records)} episodes; σ was exceeded in "
+        f"Filters covered {covered} of {len(records)} episodes; σ was exceeded in "
         f"{broken or 'none'} of them."
     )
 

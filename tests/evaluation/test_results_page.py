@@ -111,7 +111,7 @@ def test_broken_certificates_are_told(benchmark, page, write_results, tmp_path):
     write_outputs(config, [who], records)
     store(tmp_path / "b", records)
     text = write_results(tmp_path / "b", tmp_path).read_text()
-    assert "Certificates covered 3 of 3 episodes; σ was exceeded in 1 of them." in text
+    assert "Filters covered 3 of 3 episodes; σ was exceeded in 1 of them." in text
 
 
 def test_no_benchmark_or_one_with_other_records_by_now_is_refused(
