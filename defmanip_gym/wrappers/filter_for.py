@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.errors import CertificateError
+from defmanip_gym.errors import CertificateError, ParameterError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.filters.conditions import (
     LARGEST_FACTOR,
     FilterConditions,
     PayloadIntervals,
 )
+from defmanip_gym.theory.filters.family import REFERENCE_FILTERS, STORAGE_FILTERS
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
-from defmanip_gym.validation import require_instance
+from defmanip_gym.validation import require_instance, require_params
+from defmanip_gym.wrappers.applicability import require_fit
 from defmanip_gym.wrappers.filter_errors import FilterErrors, filter_errors
 
+_KINDS = (*STORAGE_FILTERS.values(), *REFERENCE_FILTERS.values())
 _ROUNDS = 4
 _SPARE = 1.05  # another level makes other errors
 _HOPELESS_M_S2 = 100.0  # the search has left what robots do
@@ -40,7 +43,10 @@ def filter_for(
         CertificateError: errors, noise and delay leave nothing of V_σ.
     """
     require_instance("config", config, TransportConfig)
-    beam = config.beam if beam is None else beam
+    beam = config.beam if beam is None else require_params("beam", beam, BeamParams)
+    if kind not in _KINDS:
+        names = ", ".join(each.__name__ for each in _KINDS)
+        raise ParameterError("kind", kind, f"one of {names}", "Other filters are made directly.")
     conditions = FilterConditions(
         swing_noise_rad=config.disturbance.swing_sensor_noise_rad, delay_periods=delay_periods
     )
@@ -52,6 +58,7 @@ def filter_for(
         conditions=conditions,
         intervals=_drawn_around(config, beam) if intervals is None else intervals,
     )
+    require_fit(config, made)
     for _ in range(_ROUNDS):
         found, given = filter_errors(config, made), made.conditions
         if max(found.acceleration_m_s2) > _HOPELESS_M_S2:

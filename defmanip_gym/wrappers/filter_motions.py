@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.errors import CertificateError
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, PITCH_TO_JOINT, ArmKinematics
 from defmanip_gym.theory.filters.reserves import hanging_modes
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
@@ -47,7 +48,7 @@ def moving_states(
     kinematics = ArmKinematics(config.robot)
     reached = kinematics.reach_and_height(np.array(arm_range(config)) @ JOINT_TO_PITCH.T)[:, 0]
     reach = drawn(rng, reached.min(), reached.max(), (count,))
-    low, high = safety_filter.heights(reach)
+    reach, low, high = _reachable(safety_filter, reach, rng)
     height = drawn(rng, low, high, (count,))
     pitch = _pitch(config, reach, height)
     rising = _vertical_speeds(safety_filter, height - low, high - height, rng)
@@ -66,6 +67,29 @@ def moving_states(
         swing=swing,
         swing_rate=swing_rate,
     )
+
+
+def _reachable(
+    safety_filter: StorageFilter, reach: Array, rng: np.random.Generator
+) -> tuple[Array, Array, Array]:
+    """Return reaches at which the filter lets the arm be, with lowest and highest grasps, (n,) m.
+
+    Raises:
+        CertificateError: there are none.
+    """
+    low, high = safety_filter.heights(reach)
+    possible = np.flatnonzero(low < high)
+    if not len(possible):
+        raise CertificateError(
+            "reach of task.start and task.goal",
+            (float(reach.min()), float(reach.max())),
+            "one at which the bent arm is above the lowest grasp",
+            "Let the robot start and end with its elbow bent, or lower smallest_grasp_height_m.",
+        )
+    if len(possible) < len(reach):
+        chosen = np.where(low < high, np.arange(len(reach)), rng.choice(possible, len(reach)))
+        reach, low, high = reach[chosen], low[chosen], high[chosen]
+    return reach, low, high
 
 
 def _pitch(config: TransportConfig, reach: Array, height: Array) -> Array:

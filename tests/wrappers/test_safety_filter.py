@@ -13,11 +13,12 @@ import defmanip_gym
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import CertificateError, ParameterError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
-from defmanip_gym.task_params import TaskParams
+from defmanip_gym.task_params import StartParams, TaskParams
 from defmanip_gym.theory.filters.conditions import FilterConditions
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.wrappers.action_delay import ActionDelay
 from defmanip_gym.wrappers.filter_for import filter_for
+from defmanip_gym.wrappers.filter_motions import moving_states
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper, SafetyFilterWrapper
 
 TOLD = {
@@ -217,3 +218,26 @@ def test_stepping_before_a_reset_is_refused():
         wrapped().step(np.zeros(3))
     with pytest.raises(ResetNeeded):
         batch(2).step(np.zeros((2, 3)))
+
+
+def test_filters_are_not_made_of_something_else():
+    config = gymnasium.make(ENV_ID).unwrapped.config
+    for arguments in ({"beam": "b"}, {"kind": int}, {"delay_periods": -1}):
+        with pytest.raises(ParameterError):
+            filter_for(config, **arguments)
+    with pytest.raises(CertificateError, match="task mode"):
+        filter_for(gymnasium.make(ENV_ID, control_mode="force").unwrapped.config)
+    with pytest.raises(CertificateError, match="segment_count"):
+        filter_for(config, beam=BeamParams(segment_count=2))
+
+
+def test_every_motion_of_the_search_is_one_that_the_arm_can_have():
+    """Low goals leave reaches without heights, which are not searched."""
+    start = StartParams(
+        center=(-8.5, 5.5, 0.0, 1.9, -2.3, 0.0), spread=(1.5, 1.5, 0.5, 0.1, 0.1, 0.05)
+    )
+    task = TaskParams(start=start, goal=(0.0, 0.0, 0.0, 0.6, -1.2, 0.0))
+    config = gymnasium.make(ENV_ID, task=task).unwrapped.config
+    made = StorageFilter(task=task)
+    motions = moving_states(config, made, 400, np.random.default_rng(0))
+    assert all(np.isfinite(part).all() for part in vars(motions).values())

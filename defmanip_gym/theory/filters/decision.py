@@ -98,8 +98,14 @@ def decide(
         moved, excess = within(
             setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
         )
-    for axis in range(3):  # zero where nothing can be foreseen, of an arm beyond its limits
-        allowed[i, axis] = moved[axis] if abs(moved[axis]) <= largest else 0.0
+    for axis in range(3):
+        allowed[i, axis] = 0.0  # where nothing can be foreseen, of an arm beyond its limits
+        if moved[axis] > largest:  # by rounding
+            allowed[i, axis] = largest
+        elif moved[axis] < -largest:
+            allowed[i, axis] = -largest
+        elif moved[axis] == moved[axis]:
+            allowed[i, axis] = moved[axis]
     return -excess if excess < np.inf else -np.inf
 
 

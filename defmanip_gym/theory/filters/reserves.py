@@ -12,6 +12,7 @@ from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.conditions import FilterConditions
 from defmanip_gym.theory.filters.storage import StorageModel
+from defmanip_gym.theory.filters.swing_estimate import STEADY_SHARE
 from defmanip_gym.theory.payload.object_model import HangingBeam
 
 
@@ -58,11 +59,15 @@ def reserved_shares(
     )
     # at the speed limit, where damping may not accelerate, velocity follows offsets a period late
     at_the_limit = 2 * (offsets + per_period)
-    ripple = conditions.storage_error * passes / (hanging_modes(beam)[0][0] * period_s)
+    swinging_rad = hanging_modes(beam)[0][0] * period_s
+    ripple = conditions.storage_error * passes / swinging_rad
     delay = conditions.delay_periods
     # what is j periods old has changed j times, but not by more than offsets allow
     changes = sum(np.minimum(j * per_period, 2 * offsets) for j in range(1, delay + 1))
     delayed = changes + delay * conditions.storage_error * passes
+    # an angle that is wrong when it is measured has turned into a rate that is
+    turned = min(delay * swinging_rad, 1.0) * STEADY_SHARE * conditions.swing_noise_rad
+    delayed += turned * GRAVITY_M_S2 * math.sin(sigma_rad) * model.moments.sum(axis=1)
     # between samples V is at most this much above the larger of its ends
     largest = task.max_acceleration_m_s2
     pull = GRAVITY_M_S2 * math.sin(sigma_rad) + largest

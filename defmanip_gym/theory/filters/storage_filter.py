@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from defmanip_gym.compiled import machine_code, without_garbage_collection
-from defmanip_gym.errors import CertificateError
+from defmanip_gym.errors import CertificateError, ParameterError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams, validated_sigma
 from defmanip_gym.task_params import TaskParams
@@ -47,7 +47,7 @@ from defmanip_gym.theory.filters.safety_filter import (
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import StorageModel
 from defmanip_gym.theory.filters.swing_estimate import SwingEstimate
-from defmanip_gym.validation import plain, require_params
+from defmanip_gym.validation import plain, require_params, require_whole
 
 _LEAST_BEND_RAD = 0.6
 _LEAST_HEIGHT_SHARE = 1.5  # of the lowest grasp that ends no episode
@@ -118,6 +118,13 @@ class StorageFilter(SafetyFilter):
         self._layout = ObservationLayout(beam.segment_count)
         self._model = StorageModel.of(self.intervals.corners(beam), self.sigma_rad)
         self.pass_j = float(self._model.passes[0])
+        if conditions.delay_periods and len(self._model.passes) > 1:
+            raise CertificateError(
+                "delay_periods with intervals of length or stiffness",
+                conditions.delay_periods,
+                "0, or a beam of which these are known exactly",
+                "Through a delay only one beam is foreseen.",
+            )
         shares = self._level_shares()
         self.level_share = float(shares.min())
         self.setup = StorageLevels(
@@ -233,7 +240,12 @@ class StorageFilter(SafetyFilter):
         return self.intervals.cover(self.beam, beam)
 
     def memory(self, count: int) -> StorageMemory:
-        """Return the memory of n episodes."""
+        """Return the memory of n episodes.
+
+        Raises:
+            ParameterError: n is no number of episodes.
+        """
+        count = require_whole("count", count, 1)
         estimate = SwingEstimate(
             count,
             self.segment_count,
@@ -262,6 +274,7 @@ class StorageFilter(SafetyFilter):
             ParameterError: observations of another size.
         """
         sensed, uncertainty = self._estimated(observation, memory)
+        self._require_memory(memory, sensed)
         wished = finite_accelerations(wished_m_s2, len(sensed.swing))
         memory.before = sensed
         if self.conditions.delay_periods:
@@ -279,6 +292,7 @@ class StorageFilter(SafetyFilter):
             By how much accelerations were others than foreseen, (n, 3) m/s².
         """
         after = Sensed.observed(self._layout, observation)
+        self._require_memory(memory, after)
         surprise = np.empty_like(memory.residual)
         commands, before = memory.under_way[0], memory.before
         self._compare(self.setup, commands, before, after, memory.residual, surprise)
@@ -288,10 +302,19 @@ class StorageFilter(SafetyFilter):
             memory.estimate.update(after.swing, after.swing_rate)
         return surprise
 
+    def _require_memory(self, memory: StorageMemory, sensed: Sensed) -> None:
+        if len(memory.residual) != len(sensed.swing):
+            raise ParameterError(
+                "number of observations",
+                len(sensed.swing),
+                f"{len(memory.residual)}, as the memory has episodes",
+                "Make the memory with memory(n).",
+            )
+
     def inside(self, observation: Array, memory: StorageMemory) -> BoolArray:
-        """Whether B is below its level, (n,)."""
-        within: BoolArray = self.storage_shares(observation, memory) <= 1.0
-        return within
+        """Whether the swing is within σ and B is below its level, (n,)."""
+        swing = np.abs(self._layout.part(np.asarray(observation), "swing")).max(axis=1)
+        return (self.storage_shares(observation, memory) <= 1.0) & (swing <= self.sigma_rad)
 
     def storage_shares(self, observation: Array, memory: StorageMemory) -> Array:
         """Return B over its level, (n,), at the least the noise allows for."""

@@ -10,6 +10,8 @@ from defmanip_gym.theory.dynamics.chain import Array
 # a Gaussian leaves six standard deviations once in 5e8 draws
 NOISE_BOUND = 6.0
 _MEMORY = 50  # periods; a longer one gains less than the errors of carrying along cost
+# of the noise's standard deviation: the bound on a running average's error
+STEADY_SHARE = NOISE_BOUND / (2 * _MEMORY - 1) ** 0.5
 
 
 class SwingEstimate:

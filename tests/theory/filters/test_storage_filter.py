@@ -159,7 +159,7 @@ def test_over_intervals_the_storage_of_every_beam_stays_below_its_pass():
 def test_a_filter_is_made_again_from_its_specification():
     made = StorageFilter(
         BeamParams(segment_count=2),
-        conditions=FilterConditions(delay_periods=2),
+        conditions=FilterConditions(swing_noise_rad=0.001),
         intervals=PayloadIntervals(mass=(0.9, 1.1)),
     )
     again = require_filter("safety_filter", made.specification)
@@ -221,3 +221,36 @@ def test_errors_survive_pickling():
 def test_another_control_period_makes_another_filter():
     slow = StorageFilter(task=TaskParams(control_period_s=0.04))
     assert slow.level_share < StorageFilter().level_share
+
+
+def test_a_delay_and_an_interval_of_length_are_not_covered_together():
+    """Attackers reached 1.2 σ: commands under way are foreseen with one beam."""
+    late, wide = FilterConditions(delay_periods=3), PayloadIntervals(length=(0.5, 1.0))
+    with pytest.raises(CertificateError, match="known exactly"):
+        StorageFilter(conditions=late, intervals=wide)
+    StorageFilter(conditions=late, intervals=PayloadIntervals(mass=(0.5, 1.5)))
+
+
+def test_no_command_is_lost_by_rounding():
+    """An axis at the largest acceleration may exceed it in the last digit; it is not dropped."""
+    made = StorageFilter(conditions=EXACT)
+    swing, rate = at_the_level(made, 0.999, count=4000)
+    rows = observation(swing, rate)
+    wished = np.random.default_rng(5).choice((-3.0, 3.0), (len(rows), 3))
+    decision = decided(made, wished, rows)
+    again = decided(made, decision.allowed_m_s2, rows)
+    assert (again.margin > -1e-6).all()
+    assert np.abs(decision.allowed_m_s2).max() <= 3.0
+
+
+def test_memories_of_another_number_of_episodes_get_our_error():
+    made = StorageFilter()
+    rows = observation([[0.0]] * 3, [[0.0]] * 3)
+    for wrong in (
+        lambda m: made.certify_action(np.zeros((3, 3)), rows, m),
+        lambda m: made.conclude(rows, m),
+    ):
+        with pytest.raises(ParameterError, match="as the memory has episodes"):
+            wrong(made.memory(2))
+    with pytest.raises(ParameterError, match="count"):
+        made.memory(-1)
