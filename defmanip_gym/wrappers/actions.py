@@ -27,7 +27,7 @@ def finite_actions(actions: Any, awake: BoolArray, shape: tuple[int, ...] = (3,)
     """
     shape = (len(awake), *shape)
     values = number_array(actions)
-    if values is not None and values.shape == shape:
+    if values is not None and values.shape == shape and not awake.all():
         values[~awake] = 0.0
     if values is None or values.shape != shape or not np.isfinite(values).all():
         raise ActionError("action", actions, f"finite numbers of shape {shape}", "Check them.")

@@ -108,10 +108,12 @@ class Filtering:
             ActionError: actions that are not finite or of another shape.
         """
         awake = np.ones(len(observation), dtype=bool) if idle is None else ~idle
-        wished = np.clip(finite_actions(actions, awake), -1.0, 1.0)
+        wished = np.minimum(np.maximum(finite_actions(actions, awake), -1.0), 1.0)
         decision = self._filter.certify_action(self._limit * wished, observation, self._memory)
         change = decision.allowed_m_s2 - self._limit * wished
-        correction = np.where(awake, np.sqrt((change**2).sum(axis=1)), 0.0)
+        correction = np.sqrt(np.einsum("ij,ij->i", change, change))
+        if idle is not None:
+            correction[idle] = 0.0
         self.steps += int(np.count_nonzero(awake))
         self.interventions += int(np.count_nonzero(correction > ROUNDING_M_S2))
         self.total_correction_m_s2 += float(correction.sum())

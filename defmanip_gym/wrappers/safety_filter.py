@@ -132,7 +132,7 @@ class SafetyFilterVectorWrapper(gymnasium.vector.VectorWrapper[Any, Any, Any, An
         mask = (options or {}).get("reset_mask")
         started = np.ones(self.num_envs, dtype=bool) if mask is None else np.asarray(mask)
         self._ended = self._ended & ~started
-        self._begin(observation, started)
+        self._begin(observation.copy(), started)
         return observation, info | self._report(Filtered.nothing(self.num_envs))
 
     def step(
@@ -142,22 +142,24 @@ class SafetyFilterVectorWrapper(gymnasium.vector.VectorWrapper[Any, Any, Any, An
         if self._observation is None:
             raise ResetNeeded("Call reset() before the first step().")
         mode = self.env.metadata["autoreset_mode"]
-        idle = self._ended if mode is AutoresetMode.NEXT_STEP else None
+        waits = mode is AutoresetMode.NEXT_STEP and self._ended.any()
+        idle = self._ended if waits else None
         filtered = self.filtering.certify(actions, self._observation, idle)
         observation, reward, terminated, truncated, info = self.env.step(filtered.applied)
         ended = terminated | truncated
-        self.filtering.conclude(info.get("final_obs", observation), idle)
+        own = observation.copy()  # the caller's own from now on
+        self.filtering.conclude(info.get("final_obs", own), idle)
         if "final_info" in info:
             info["final_info"] |= self._report(filtered)
         if mode is AutoresetMode.NEXT_STEP:
             started, self._ended = self._ended, ended
         else:
             started = ended if mode is AutoresetMode.SAME_STEP else np.zeros_like(ended)
-        self._begin(observation, started)
+        self._begin(own, started)
         return observation, reward, terminated, truncated, info | self._report(filtered)
 
     def _begin(self, observation: Array, started: BoolArray) -> None:
-        self._observation = observation.copy()  # the caller's own from now on
+        self._observation = observation
         self.filtering.begin(observation, started)
 
     def _report(self, filtered: Filtered) -> dict[str, Any]:

@@ -30,6 +30,7 @@ class StorageTerms:
         self._config, self._filter = config, safety_filter
         self.method = safety_filter.name
         self.delay_periods = safety_filter.conditions.delay_periods
+        self._provided = np.array((*safety_filter.errors_m_s2, *safety_filter.offsets_m_s2))
 
     @property
     def outside_reason(self) -> str:
@@ -86,8 +87,10 @@ class StorageTerms:
         self, surprise: Array, observation: Array, memory: StorageMemory
     ) -> tuple[BoolArray, Callable[[int], str]]:
         """Return where a period broke the terms, (n,), and what to say of an episode."""
+        provided = self._provided
+        if (memory.largest <= provided).all():
+            return np.zeros(len(surprise), dtype=bool), str
         sizes = np.abs(np.concatenate((surprise, memory.residual), axis=1))
-        provided = np.array((*self._filter.errors_m_s2, *self._filter.offsets_m_s2))
 
         def reason(i: int) -> str:
             worst = int(np.argmax(sizes[i] / np.maximum(provided, 1e-12)))

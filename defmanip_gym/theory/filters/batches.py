@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from defmanip_gym.compiled import compiled
+from math import inf
+
+from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels, speed_excess
@@ -37,6 +39,7 @@ def compare_all(
     after: Sensed,
     residual: Array,
     surprise: Array,
+    largest: Array,
 ) -> None:
     """Write what a period's acceleration had beside what was foreseen, and how that has changed.
 
@@ -47,8 +50,11 @@ def compare_all(
         after: those a period later.
         residual: of the period before, and then of this, (n, 3) m/s².
         surprise: by how much it has changed, (n, 3) m/s².
+        largest: of all n the largest changes and residuals, (6,) m/s².
     """
     limits = setup.limits
+    for axis in range(6):
+        largest[axis] = 0.0
     for i in range(len(commands)):
         forward, left, up = limited_acceleration(
             commands[i, 0],
@@ -80,6 +86,17 @@ def compare_all(
         surprise[i, 1] = left - residual[i, 1]
         surprise[i, 2] = up - residual[i, 2]
         residual[i, 0], residual[i, 1], residual[i, 2] = forward, left, up
+        for axis in range(3):
+            largest[axis] = _larger(largest[axis], abs(surprise[i, axis]))
+            largest[3 + axis] = _larger(largest[3 + axis], abs(residual[i, axis]))
+
+
+@compilable
+def _larger(one: float, other: float) -> float:
+    """Return the larger of two numbers; infinity where the second one is none."""
+    if other <= one:
+        return one
+    return other if other > one else inf
 
 
 @compiled

@@ -104,7 +104,8 @@ def finite_accelerations(wished_m_s2: Any, count: int) -> Array:
     Raises:
         ActionError: not finite or of another shape.
     """
-    values = number_array(wished_m_s2)
+    is_ready = isinstance(wished_m_s2, np.ndarray) and wished_m_s2.dtype == np.float64
+    values = np.ascontiguousarray(wished_m_s2) if is_ready else number_array(wished_m_s2)
     if values is None or values.shape != (count, 3) or not np.isfinite(values).all():
         raise ActionError(
             "wished acceleration",

@@ -58,15 +58,22 @@ class Sensed(NamedTuple):
                 "Filter the environment that the filter was made for.",
             )
         values = np.ascontiguousarray(observation, dtype=np.float64)
-        sensed = cls.empty(len(values), layout.segment_count)
+        sensed = cls._room(len(values), layout.segment_count)
         _read_all(values, layout.segment_count, sensed)
         return sensed
 
     @classmethod
     def empty(cls, count: int, segments: int) -> Sensed:
         """Return n states at rest."""
+        sensed = cls._room(count, segments)
+        for part in sensed:
+            part[:] = 0.0
+        return sensed
+
+    @classmethod
+    def _room(cls, count: int, segments: int) -> Sensed:
         shapes = [(count, size) for size in (3, 2, 2, 2, segments, segments)]
-        return cls(*(np.zeros(shape) for shape in (*shapes, (count,))))
+        return cls(*(np.empty(shape) for shape in (*shapes, (count,))))
 
     def replaced(self, other: Sensed, where: NDArray[np.bool_]) -> Sensed:
         """Return these states with those of ``other`` where (n,) says so."""

@@ -62,6 +62,8 @@ class StorageMemory:
 
     def __init__(self, count: int, delay_periods: int, estimate: SwingEstimate) -> None:
         self.residual = np.zeros((count, 3))  # m/s², of the last period
+        self.largest = np.zeros(6)  # of all, changes and residuals of the last period
+        self.concluded: tuple[Array, Sensed] | None = None  # observations as last seen
         self.under_way = np.zeros((delay_periods + 1, count, 3))  # the first takes effect next
         self.before = Sensed.empty(count, estimate.mean.shape[1])
         self.estimate = estimate
@@ -147,7 +149,7 @@ class StorageFilter(SafetyFilter):
     def _compile(self) -> None:
         sensed, vectors, numbers, _ = self._examples()
         self._compare = machine_code(
-            compare_all, self.setup, vectors, sensed, sensed, vectors, vectors
+            compare_all, self.setup, vectors, sensed, sensed, vectors, vectors, numbers
         )
         self._store = machine_code(store_all, self.setup, sensed, self._room, numbers)
         self._misjudge = machine_code(misjudge_all, self.setup, sensed, sensed, self._room, numbers)
@@ -295,7 +297,10 @@ class StorageFilter(SafetyFilter):
         self._require_memory(memory, after)
         surprise = np.empty_like(memory.residual)
         commands, before = memory.under_way[0], memory.before
-        self._compare(self.setup, commands, before, after, memory.residual, surprise)
+        self._compare(
+            self.setup, commands, before, after, memory.residual, surprise, memory.largest
+        )
+        memory.concluded = observation, after
         if self.conditions.delay_periods:
             memory.under_way = np.concatenate((memory.under_way[1:], memory.under_way[:1]))
         if self.conditions.swing_noise_rad:
@@ -370,7 +375,11 @@ class StorageFilter(SafetyFilter):
         return shares
 
     def _estimated(self, observation: Array, memory: StorageMemory) -> tuple[Sensed, Array]:
-        sensed = Sensed.observed(self._layout, observation)
+        # a period begins with the observations with which the last one was concluded
+        if memory.concluded is not None and memory.concluded[0] is observation:
+            sensed = memory.concluded[1]
+        else:
+            sensed = Sensed.observed(self._layout, observation)
         if not self.conditions.swing_noise_rad:
             return sensed, np.zeros_like(sensed.swing)
         estimate = memory.estimate
