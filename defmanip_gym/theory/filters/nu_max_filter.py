@@ -23,6 +23,7 @@ from defmanip_gym.theory.filters.safety_filter import (
     FilterProof,
     SafetyFilter,
     finite_accelerations,
+    require_count,
 )
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.validation import plain, require_params
@@ -107,6 +108,7 @@ class NuMaxFilter(SafetyFilter):
             ParameterError: observations of another size.
         """
         sensed = Sensed.observed(self._layout, observation)
+        require_count(len(memory.excess), len(sensed.heading))
         wished = finite_accelerations(wished_m_s2, len(sensed.heading))
         limit = self.task.max_acceleration_m_s2
         command = certified_command(
@@ -127,6 +129,7 @@ class NuMaxFilter(SafetyFilter):
     def conclude(self, observation: Array, memory: NuMaxMemory) -> Array:
         """Take note of the motion at the end of the period; return the surprises, (n, 3) m/s²."""
         after, before = Sensed.observed(self._layout, observation), memory.before
+        require_count(len(memory.excess), len(after.heading))
         earlier = base_to_world(before.velocity_b, before.heading - after.heading)
         gained = (after.velocity_b - earlier) / self.task.control_period_s
         excess = gained - memory.command

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.errors import ActionError
+from defmanip_gym.errors import ActionError, ParameterError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
@@ -96,6 +96,17 @@ class SafetyFilter(ABC):
     @abstractmethod
     def inside(self, observation: Array, memory: Any) -> BoolArray:
         """Whether the states are where the filter's promise begins to hold, (n,)."""
+
+
+def require_count(episodes: int, observations: int) -> None:
+    """Raise ParameterError unless there are as many observations as a memory has episodes."""
+    if episodes != observations:
+        raise ParameterError(
+            "number of observations",
+            observations,
+            f"{episodes}, as the memory has episodes",
+            "Make the memory with memory(n).",
+        )
 
 
 def finite_accelerations(wished_m_s2: Any, count: int) -> Array:

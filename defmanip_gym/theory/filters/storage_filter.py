@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from defmanip_gym.compiled import machine_code, without_garbage_collection
-from defmanip_gym.errors import CertificateError, ParameterError
+from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams, validated_sigma
 from defmanip_gym.task_params import TaskParams
@@ -43,6 +43,7 @@ from defmanip_gym.theory.filters.safety_filter import (
     FilterProof,
     SafetyFilter,
     finite_accelerations,
+    require_count,
 )
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import StorageModel
@@ -260,6 +261,7 @@ class StorageFilter(SafetyFilter):
     def begin(self, memory: StorageMemory, observation: Array, started: BoolArray) -> None:
         """Let episodes start, (n,), with their first observations, (n, size)."""
         sensed = Sensed.observed(self._layout, observation)
+        require_count(len(memory.residual), len(sensed.swing))
         memory.residual[started] = 0.0
         memory.under_way[:, started] = 0.0
         memory.before = memory.before.replaced(sensed, started)
@@ -276,7 +278,7 @@ class StorageFilter(SafetyFilter):
             ParameterError: observations of another size.
         """
         sensed, uncertainty = self._estimated(observation, memory)
-        self._require_memory(memory, sensed)
+        require_count(len(memory.residual), len(sensed.swing))
         wished = finite_accelerations(wished_m_s2, len(sensed.swing))
         memory.before = sensed
         if self.conditions.delay_periods:
@@ -294,7 +296,7 @@ class StorageFilter(SafetyFilter):
             By how much accelerations were others than foreseen, (n, 3) m/s².
         """
         after = Sensed.observed(self._layout, observation)
-        self._require_memory(memory, after)
+        require_count(len(memory.residual), len(after.swing))
         surprise = np.empty_like(memory.residual)
         commands, before = memory.under_way[0], memory.before
         self._compare(
@@ -306,15 +308,6 @@ class StorageFilter(SafetyFilter):
         if self.conditions.swing_noise_rad:
             memory.estimate.update(after.swing, after.swing_rate)
         return surprise
-
-    def _require_memory(self, memory: StorageMemory, sensed: Sensed) -> None:
-        if len(memory.residual) != len(sensed.swing):
-            raise ParameterError(
-                "number of observations",
-                len(sensed.swing),
-                f"{len(memory.residual)}, as the memory has episodes",
-                "Make the memory with memory(n).",
-            )
 
     def inside(self, observation: Array, memory: StorageMemory) -> BoolArray:
         """Whether the swing is within σ and B is below its level, (n,)."""

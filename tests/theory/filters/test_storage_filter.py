@@ -249,6 +249,7 @@ def test_memories_of_another_number_of_episodes_get_our_error():
     for wrong in (
         lambda m: made.certify_action(np.zeros((3, 3)), rows, m),
         lambda m: made.conclude(rows, m),
+        lambda m: made.begin(m, rows, np.ones(3, dtype=bool)),
     ):
         with pytest.raises(ParameterError, match="as the memory has episodes"):
             wrong(made.memory(2))
