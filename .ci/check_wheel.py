@@ -36,7 +36,7 @@ from pathlib import Path
 import gymnasium
 import defmanip_gym
 from defmanip_gym.baselines.learned.agents import load_agent
-from defmanip_gym.baselines.tanner import TannerController
+from defmanip_gym.baselines.analytic.tanner import TannerController
 
 assert Path(defmanip_gym.__file__).is_relative_to(sys.prefix), defmanip_gym.__file__
 controller, state, ended = {controller}, None, False

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from defmanip_gym.baselines.tanner import TannerController
+from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering.renderer import TransportRenderer

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from defmanip_gym.baselines.tanner import TannerParams
+from defmanip_gym.baselines.analytic.tanner import TannerParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.deform_transport import DeformTransportEnv
 from defmanip_gym.errors import ParameterError

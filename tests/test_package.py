@@ -93,7 +93,7 @@ def test_a_bare_id_works_after_importing_the_package():
 def test_running_an_environment_and_the_papers_controller_needs_no_torch():
     code = (
         "import sys, gymnasium; "
-        "from defmanip_gym.baselines.tanner import TannerController; "
+        "from defmanip_gym.baselines.analytic.tanner import TannerController; "
         "env = gymnasium.make('defmanip_gym:DeformTransport-v0'); "
         "observation, _ = env.reset(seed=0); "
         "env.step(TannerController().predict(observation)[0]); "

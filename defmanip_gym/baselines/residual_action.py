@@ -14,9 +14,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.baselines.residual import corrected, required_periods
-from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify

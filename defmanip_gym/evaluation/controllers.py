@@ -13,11 +13,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import controller_of
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
-from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
 from defmanip_gym.theory.certificates import Certificate

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from defmanip_gym.baselines.tanner import TannerController, TannerParams
+from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.evaluation.conditions import Condition

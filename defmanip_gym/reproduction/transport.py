@@ -4,7 +4,7 @@ A Gymnasium step would spend its time on observation, reward and info, and most 
 would go into models that hardly change from sample to sample. So the outer loop (velocity field,
 tracking (20)) runs every two seconds, and with it the force law (10) and the feedback linearization
 (28) are expanded to first order; the force loop (29) in between uses the expansions. The control
-law is ``baselines.cascade``, as in the controller; ``tests/reproduction`` holds the expansions
+law is that of ``baselines.analytic.cascade``; ``tests/reproduction`` holds the expansions
 against the functions themselves.
 """
 
@@ -16,7 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from defmanip_gym.baselines.cascade import Cascade, GraspSample, LoopMemory
+from defmanip_gym.baselines.analytic.cascade import Cascade, LoopMemory
+from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
 from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import DivergenceError
 from defmanip_gym.evaluation.readings import heading_error, position_from_goal

@@ -8,10 +8,10 @@ import pytest
 from safetensors.numpy import load_file, save_file
 from small_agents import CARD, small_agent
 
+from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.baselines.learned.agents import controller_of, load_agent, load_family
 from defmanip_gym.baselines.learned.card import Normalization, SuiteScore
 from defmanip_gym.baselines.learned.families import shipped_families, write_card
-from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify

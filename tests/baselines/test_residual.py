@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.baselines.controller import ZeroController
 from defmanip_gym.baselines.residual import ResidualController, corrected
 from defmanip_gym.baselines.residual_action import (
@@ -11,7 +12,6 @@ from defmanip_gym.baselines.residual_action import (
     ResidualVectorAction,
     residual_authority,
 )
-from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from defmanip_gym.baselines.tanner import TannerController, TannerParams
+from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.errors import GainError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.baselines.controller import ZeroController
-from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.envs.starts import PAPER_START
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.evaluation.controllers import RandomPerEpisode

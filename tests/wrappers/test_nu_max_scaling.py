@@ -6,8 +6,8 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
+from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.baselines.controller import RandomController
-from defmanip_gym.baselines.tanner import TannerController, TannerParams
 from defmanip_gym.errors import ActionError, CertificateError
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import (

@@ -6,6 +6,7 @@ import os
 import zipfile
 from pathlib import Path
 
+from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.baselines.learned.actor import CARD_SUFFIX, TENSOR_SUFFIX, MlpActor, load_actor
 from defmanip_gym.baselines.learned.families import (
@@ -16,7 +17,6 @@ from defmanip_gym.baselines.learned.families import (
 )
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.baselines.residual import ResidualController
-from defmanip_gym.baselines.tanner import TannerController
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.task_params import TaskParams

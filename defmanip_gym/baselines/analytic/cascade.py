@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
 from defmanip_gym.theory.control.control_laws import (
     ForceLoopGains,
     force_loop,
@@ -23,31 +24,6 @@ from defmanip_gym.theory.payload.object_model import HangingBeam
 
 # share of the yaw rate bound that desired velocities use
 _YAW_SHARE = 0.8
-
-
-@dataclass(frozen=True, kw_only=True)
-class GraspSample:
-    """What the cascade looks at in one sample; n episodes, N segments.
-
-    Attributes:
-        position: of the grasp from the goal in axes of the goal's heading, (n, 3) m.
-        heading: θ − θ_goal, (n,) rad.
-        velocity_b: ż1 in the base frame, (n, 3) m/s.
-        yaw_rate: u2, (n,) rad/s.
-        reach: ρ, (n,) m.
-        swing: φ, (n, N) rad.
-        swing_rate: φ̇, (n, N) rad/s.
-        force_b: f̃, the measured force on the object in the base frame, (n, 3) N.
-    """
-
-    position: Array
-    heading: Array
-    velocity_b: Array
-    yaw_rate: Array
-    reach: Array
-    swing: Array
-    swing_rate: Array
-    force_b: Array
 
 
 @dataclass(frozen=True, kw_only=True)

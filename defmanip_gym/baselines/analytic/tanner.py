@@ -13,7 +13,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.baselines.cascade import Cascade, GraspSample, LoopMemory
+from defmanip_gym.baselines.analytic.cascade import Cascade, LoopMemory
+from defmanip_gym.baselines.analytic.grasp_sample import grasp_sample
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.errors import CertificateError, GainError
 from defmanip_gym.observation import ObservationLayout
@@ -23,7 +24,6 @@ from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.control.control_laws import ForceLoopGains
 from defmanip_gym.theory.control.stability import SampledLoop
 from defmanip_gym.theory.control.velocity_field import LiteralField, NormalizedField, VelocityField
-from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.theory.payload.object_model import HangingBeam
 from defmanip_gym.validation import (
@@ -154,29 +154,10 @@ class TannerController:
         """Return w / a_max and (∫Δu_o, the u_o of this sample)."""
         batch = np.atleast_2d(observation)
         memory = self._memory(len(batch), state, episode_start)
-        command = self.cascade.command(self._sample(batch), memory)
+        command = self.cascade.command(grasp_sample(batch, self.layout, self.kinematics), memory)
         action = np.clip(command.w / self.task.max_acceleration_m_s2, -1.0, 1.0)
         memory = command.memory
         return action.reshape(*observation.shape[:-1], 3), (memory.error_integral, memory.u_o)
-
-    def _sample(self, batch: Array) -> GraspSample:
-        """Read observations (n, size)."""
-
-        def part(name: str) -> Array:
-            return self.layout.part(batch, name)
-
-        heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
-        pitch = part("joints") @ JOINT_TO_PITCH.T
-        return GraspSample(
-            position=base_to_world(-part("goal_offset_b"), heading),
-            heading=heading,
-            velocity_b=part("grasp_velocity_b"),
-            yaw_rate=part("base_velocity")[:, 1],
-            reach=self.kinematics.reach_and_height(pitch)[:, 0],
-            swing=part("swing"),
-            swing_rate=part("swing_rate"),
-            force_b=part("grasp_force_b"),
-        )
 
     def _memory(
         self, count: int, state: State | None, episode_start: NDArray[np.bool_] | None

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from defmanip_gym.baselines.tanner import TannerController, TannerParams
+from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.errors import CertificateError, GainError, ParameterError
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, CertificateConditions, certify

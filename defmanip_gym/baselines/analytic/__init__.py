@@ -1,0 +1,1 @@
+"""Analytic controllers: the paper's own and the ladder beside it, one file each."""
