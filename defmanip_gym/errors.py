@@ -20,6 +20,10 @@ class DefmanipError(Exception):
         # by its text alone, whatever its constructor takes
         return _rebuilt, (type(self), str(self)), attributes
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # what asks for this one instead: tblib, which dask hands all exceptions to
+        return self.__reduce_ex__(pickle.DEFAULT_PROTOCOL)
+
 
 class InvalidValueError(DefmanipError, ValueError):
     """A value that the package cannot accept.
@@ -88,6 +92,10 @@ class CertificateError(InvalidValueError):
 
 class GainError(InvalidValueError):
     """Controller gains for which the sampled loop is not stable."""
+
+
+class ControllerError(InvalidValueError):
+    """A controller that cannot be made, or is none."""
 
 
 class AgentFileError(InvalidValueError):

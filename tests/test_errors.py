@@ -3,6 +3,8 @@
 import copy
 import multiprocessing
 import pickle
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import gymnasium
@@ -90,6 +92,17 @@ def test_value_that_cannot_travel_arrives_as_its_text(value):
     arrived = pickle.loads(pickle.dumps(error))
     assert (arrived.value, str(arrived)) == (repr(value), str(error))
     assert copy.deepcopy(error).name == error.name
+
+
+def test_value_that_cannot_travel_arrives_as_its_text_where_all_exceptions_are_tblibs():
+    pytest.importorskip("tblib")
+    code = (
+        "import pickle; from tblib import pickling_support; from defmanip_gym.errors import *; "
+        "pickling_support.install(); error = StartError('start', lambda: None, 'six', 'Give.'); "
+        "arrived = pickle.loads(pickle.dumps(error)); "
+        "assert (arrived.value, str(arrived)) == (repr(error.value), str(error))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_value_that_cannot_even_be_shown_does_not_break_the_error():

@@ -1,20 +1,36 @@
-"""Colours of learned contestants in plots: alone, inside a filter, inside a certificate."""
+"""Colours of contestants in plots: light alone, dark inside a filter."""
 
 from __future__ import annotations
+
+from defmanip_gym.evaluation.options import OPTIONS
 
 GUEST_COLOURS = ("#7a5195", "#c77dba")  # of the user's own agents
 
 
-def family_colours(family: str) -> tuple[str, str, str]:
-    """Return a family's colours, always the same for a name; the last one is greyer."""
-    pair = _COLOURS.get(family) or _MORE_COLOURS[sum(family.encode()) % len(_MORE_COLOURS)]
+def contestant_colour(base: str, method: str) -> str:
+    """Return a contestant's colour, always the same for a name.
+
+    Args:
+        base: its name without the filter.
+        method: names the filter; empty for none. The further down the list of options, the greyer.
+    """
+    pair = _COLOURS.get(base) or _MORE_COLOURS[sum(base.encode()) % len(_MORE_COLOURS)]
+    if not method:
+        return pair[0]
+    share = OPTIONS.index(method) / len(OPTIONS)
     channels = (int(pair[1][i : i + 2], 16) for i in (1, 3, 5))
-    greyer = "#" + "".join(f"{(channel + _GREY) // 2:02x}" for channel in channels)
-    return (*pair, greyer)
+    mixed = (round(channel + share * (_GREY - channel)) for channel in channels)
+    return "#" + "".join(f"{channel:02x}" for channel in mixed)
 
 
 _GREY = 0x80
 _COLOURS = {
+    "tanner": ("#45b5aa", "#12806a"),
+    "field": ("#7fb3e6", "#2f7fc1"),
+    "lqr": ("#9aa8d8", "#3f51a3"),
+    "shaped": ("#a3bf6b", "#5a6e2e"),
+    "mpc": ("#d99cc4", "#8a3a76"),
+    "time_optimal": ("#6f7f95", "#1b3a6b"),
     "ppo": ("#f0a35e", "#c7651a"),
     "ppo-randomized": ("#e3c04b", "#a8860f"),
     "sac": ("#e58a8a", "#b3293b"),

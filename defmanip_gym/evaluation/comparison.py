@@ -16,12 +16,9 @@ from defmanip_gym.evaluation.assignments import assignments
 from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestant import Contestant
-from defmanip_gym.evaluation.contestants import (
-    agent_contestants,
-    standard_contestants,
-    standard_names,
-)
+from defmanip_gym.evaluation.contestants import standard_contestants, standard_names
 from defmanip_gym.evaluation.filter_timings import FILTER_TIMING_FILE, measured_filter_times
+from defmanip_gym.evaluation.learned_contestants import agent_contestants
 from defmanip_gym.evaluation.outputs import print_results, write_outputs
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.evaluation.records import EpisodeRecord
@@ -50,6 +47,7 @@ def run_comparison(config: ComparisonConfig) -> Path:
     Raises:
         RecordError: the output folder cannot be used, or holds damaged or other records.
         ParameterError: unknown contestants.
+        ControllerError: a ``module:factory`` that leads to no controller.
         AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
     console = Console()

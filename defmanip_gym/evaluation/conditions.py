@@ -78,3 +78,6 @@ class Condition:
             nominal_beam=replace(NOMINAL_BEAM, damping=0.0),
             disturbance=self.disturbance,
         )
+
+
+NOMINAL = Condition(name="nominal")

@@ -32,6 +32,8 @@ class ComparisonConfig:
 
         python evaluate.py --suites mismatch --contestants tanner/l1 ppo ppo/phase_plane
 
+        python evaluate.py --contestants tanner my_module:make_controller/storage
+
         python evaluate.py --agents runs/DeformTransport-v0-sac-seed0 --output results/mine
 
         python evaluate.py --agents logs/ppo/best_model.zip --allow-pickle --output results/mine
@@ -44,7 +46,8 @@ class ComparisonConfig:
     episodes: int | Literal["all"] = 24
     """How many scenarios of each condition of a suite are run, the first ones; or "all"."""
     contestants: tuple[str, ...] | None = None
-    """Names of those who take part; all by default."""
+    """Names of those who take part; all by default. Or anybody's controllers as module:factory,
+    each alone or, with a slash, inside a filter: my_package.my_module:make_controller/storage."""
     members: int | Literal["all"] = 3
     """How many agents of each learned contestant take part, lowest training seeds first; or
     "all"."""

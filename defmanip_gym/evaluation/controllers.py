@@ -13,13 +13,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import controller_of
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
+from defmanip_gym.baselines.registry import identity_of, make_controller
 from defmanip_gym.errors import AgentFileError
-from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
+from defmanip_gym.evaluation.conditions import NOMINAL
 from defmanip_gym.theory.certificates import Certificate
 
 Array = NDArray[np.float64]
@@ -70,28 +70,25 @@ class Random:
 
 
 @dataclass(frozen=True)
-class Tanner:
-    """The paper's controller for the nominal beam.
+class Made:
+    """What a factory makes for the nominal environment.
 
     Attributes:
-        certificate: to whose bounds it keeps; None for its own.
+        reference: ``module:factory``.
+        certificate: to whose bounds it keeps; None for its own, and for all that take none.
     """
 
+    reference: str
     certificate: Certificate | None = None
 
     def build(self, seeds: Sequence[int]) -> Controller:
         """Return the controller."""
-        return TannerController(beam=NOMINAL_BEAM, certificate=self.certificate)
+        return make_controller(self.reference, NOMINAL.environment, self.certificate)
 
     @property
     def identity(self) -> dict[str, Any]:
-        """Design choices, beam and certificate."""
-        return {
-            "controller": "tanner",
-            "params": asdict(TannerParams()),
-            "beam": asdict(NOMINAL_BEAM),
-            "certificate": certificate_identity(self.certificate),
-        }
+        """What it tells of itself; of others' controllers, their source."""
+        return identity_of(self.reference, self.build(()))
 
 
 @dataclass(frozen=True)
@@ -114,7 +111,7 @@ class Learned:
     @property
     def identity(self) -> dict[str, Any]:
         """The network, and what is below a residual."""
-        base = None if self.certificate is None else Tanner(self.certificate).identity
+        base = None if self.certificate is None else certificate_identity(self.certificate)
         return {"controller": self.actor.digest, "base": base}
 
 

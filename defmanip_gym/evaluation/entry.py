@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Family = Literal["reference", "analytic", "learned"]
+Family = Literal["reference", "analytic", "learned", "guest"]
 
 SOLE_MEMBER = "-"  # of contestants that nobody trains
 
@@ -28,5 +28,5 @@ class Entry:
 
     @property
     def file_stem(self) -> str:
-        """Its name in file names; slashes become pluses."""
-        return f"{self.contestant.replace('/', '+')}.{self.member}"
+        """Its name in file names: slashes become pluses, colons equal signs."""
+        return f"{self.contestant.replace('/', '+').replace(':', '=')}.{self.member}"

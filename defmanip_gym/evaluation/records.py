@@ -24,7 +24,8 @@ class EpisodeRecord:
         scenario: name within the suite.
         condition: of the plant; name within the suite.
         contestant: who controlled it.
-        family: ``"reference"``, ``"analytic"`` or ``"learned"``.
+        family: ``"reference"``, ``"analytic"``, ``"learned"`` or ``"guest"``, a controller that was
+            named by ``module:factory``.
         member: seed of the contestant's training, "-" of one that nobody trains.
         seed: of its randomness.
         start: (x, y, θ, q1, q2, φ), m and rad.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
+from defmanip_gym.errors import ActionError
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
 from defmanip_gym.evaluation.course import CourseRecorder
 from defmanip_gym.evaluation.entry import Entry
@@ -23,12 +24,14 @@ from defmanip_gym.evaluation.suites import Scenario
 from defmanip_gym.evaluation.traces import Trace, trace_of
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
-from defmanip_gym.validation import require_positive
+from defmanip_gym.validation import number_array, require_positive
 from defmanip_gym.wrappers.action_delay import ActionDelay
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+
+ACTION_SIZE = 3  # in task mode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +108,7 @@ def rollout(
             actions, state = controller.predict(
                 observation, state, episode_start, deterministic=True
             )
-            actions = np.where(running[:, None], np.clip(actions, -1.0, 1.0), 0.0)
+            actions = np.where(running[:, None], _checked(actions, len(scenarios)), 0.0)
             episode_start = np.zeros_like(running)
             after, reward, terminated, truncated, info = env.step(actions)
             observation = np.where(running[:, None], after, observation)
@@ -121,6 +124,19 @@ def rollout(
         trace = trace_of(course, entry, scenario.name, config) if wanted else None
         episodes.append(Episode(record=record, trace=trace))
     return tuple(episodes)
+
+
+def _checked(actions: object, count: int) -> Array:
+    """Return a controller's actions, clipped; NaN and infinity are the environment's to refuse."""
+    values = number_array(actions)
+    if values is None or values.shape != (count, ACTION_SIZE):
+        raise ActionError(
+            "action",
+            actions if values is None else f"an array of shape {values.shape}",
+            f"numbers of shape {(count, ACTION_SIZE)}, a row for each episode",
+            "A controller's predict gets a batch of observations, (n, size).",
+        )
+    return np.clip(values, -1.0, 1.0)
 
 
 def _environment(

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from defmanip_gym.envs.starts import PAPER_START, StartSampler
-from defmanip_gym.evaluation.conditions import Condition
+from defmanip_gym.evaluation.conditions import NOMINAL, Condition
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
 from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
 from defmanip_gym.task_params import StartParams
@@ -87,8 +87,6 @@ def _conditions(factor: str, *values: float) -> list[Condition]:
     name = factor.removesuffix("_factor")
     return [Condition(name=f"{name}-x{value:g}", **{factor: value}) for value in values]  # type: ignore[arg-type]
 
-
-NOMINAL = Condition(name="nominal")
 
 _PAPER = (
     Condition(name="simulated-damping", disturbance=PAPER_DISTURBANCE),

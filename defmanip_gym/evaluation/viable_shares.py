@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 from defmanip_gym.errors import CertificateError
+from defmanip_gym.evaluation.conditions import NOMINAL
 from defmanip_gym.evaluation.protection import Protection
-from defmanip_gym.evaluation.suites import NOMINAL
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.theory.filters.viability import ViableSet, viable_set
 from defmanip_gym.theory.filters.viability_share import certificate_share, storage_share

@@ -15,7 +15,7 @@ from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import AgentFileError, ParameterError
 from defmanip_gym.evaluation.comparison import ComparisonConfig
-from defmanip_gym.evaluation.contestants import agent_contestants
+from defmanip_gym.evaluation.learned_contestants import agent_contestants
 from defmanip_gym.evaluation.protection import Certificates
 
 OBSERVATIONS = np.random.default_rng(0).normal(2.0, 3.0, size=(5, 22))

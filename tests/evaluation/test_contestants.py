@@ -11,16 +11,17 @@ import pytest
 from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import load_agent, load_family, shipped_families
+from defmanip_gym.baselines.registry import registered_controllers
 from defmanip_gym.errors import AgentFileError, ParameterError
 from defmanip_gym.evaluation import protection
 from defmanip_gym.evaluation.contestants import (
-    FILTER_OPTION,
-    agent_contestants,
     known_names,
     standard_contestants,
     standard_names,
 )
 from defmanip_gym.evaluation.controllers import RandomPerEpisode
+from defmanip_gym.evaluation.learned_contestants import agent_contestants
+from defmanip_gym.evaluation.options import FILTER_OPTION
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.observation import ObservationLayout
 
@@ -47,7 +48,7 @@ def agent(card_changes=(), size=SIZE):
 
 def test_every_controller_gets_the_same_filter(everyone):
     names = [contestant.name for contestant in everyone]
-    for controller in ("tanner", *shipped_families()):
+    for controller in (*registered_controllers(), *shipped_families()):
         assert controller in names and f"{controller}/{FILTER_OPTION}" in names
     assert {"zero", "random", "tanner/phase_plane", "tanner/l1", "tanner/tanner"} < set(names)
 
@@ -58,7 +59,7 @@ def test_whoever_learned_inside_a_certificate_is_shown_inside_it(everyone):
 
 def test_every_controller_can_be_asked_for_inside_every_filter():
     names = known_names()
-    for controller in ("tanner", *shipped_families()):
+    for controller in (*registered_controllers(), *shipped_families()):
         for method in ("storage", "phase_plane", "l1", "tanner"):
             assert f"{controller}/{method}" in names
 
@@ -69,7 +70,8 @@ def test_names_tell_the_filter_and_families_the_kind(everyone):
         enforced = contestant.protection
         assert (enforced.method if enforced else "") == method
         base = contestant.name.partition("/")[0]
-        kinds = {"zero": "reference", "random": "reference", "tanner": "analytic"}
+        kinds = dict.fromkeys(registered_controllers(), "analytic")
+        kinds |= {"zero": "reference", "random": "reference"}
         assert contestant.family == kinds.get(base, "learned")
         assert contestant.privileged and contestant.description
     assert len({contestant.colour for contestant in everyone}) == len(everyone)

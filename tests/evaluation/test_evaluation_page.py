@@ -11,7 +11,8 @@ import pytest
 
 from defmanip_gym.evaluation import comparison, seeds
 from defmanip_gym.evaluation.config import ComparisonConfig
-from defmanip_gym.evaluation.contestants import FILTER_OPTION, standard_names
+from defmanip_gym.evaluation.contestants import standard_names
+from defmanip_gym.evaluation.options import FILTER_OPTION
 from defmanip_gym.evaluation.protection import StorageProtection
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.statistics.aggregates import WORST_SHARE
@@ -91,7 +92,7 @@ def test_the_script_for_a_cluster_runs_there(monkeypatch):
         "run_comparison",
         lambda config: used.append(type(joblib.parallel.get_active_backend()[0]).__name__),
     )
-    (script,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+    *_, script = re.findall(r"```python\n(.*?)```", PAGE, re.S)
     with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster:
         script = script.replace('"tcp://scheduler:8786"', repr(cluster.scheduler_address))
         exec(compile(script, "evaluation.md", "exec"), {})

@@ -8,11 +8,11 @@ import pytest
 from defmanip_gym.baselines.analytic.tanner import TannerController
 from defmanip_gym.baselines.controller import ZeroController
 from defmanip_gym.envs.starts import PAPER_START
-from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
+from defmanip_gym.evaluation.conditions import NOMINAL, NOMINAL_BEAM, Condition
 from defmanip_gym.evaluation.controllers import RandomPerEpisode
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
-from defmanip_gym.evaluation.suites import NOMINAL, Scenario, suite_named
+from defmanip_gym.evaluation.suites import Scenario, suite_named
 from defmanip_gym.params import PAPER_DISTURBANCE, DisturbanceParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify

@@ -18,7 +18,7 @@ from sb3_models import Spaces, poisoned, saved
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation import comparison, suites
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
-from defmanip_gym.evaluation.contestants import agent_contestants
+from defmanip_gym.evaluation.learned_contestants import agent_contestants
 from defmanip_gym.evaluation.protection import Certificates
 
 OBSERVATIONS = np.random.default_rng(0).normal(size=(5, 22))

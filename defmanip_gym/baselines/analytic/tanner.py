@@ -7,8 +7,8 @@ redundancy resolution of Section IV.B.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from defmanip_gym.baselines.analytic.cascade import Cascade, LoopMemory
 from defmanip_gym.baselines.analytic.grasp_sample import grasp_sample
 from defmanip_gym.baselines.controller import State
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError, GainError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams
@@ -144,6 +145,18 @@ class TannerController:
             feedforward=self.params.feedforward,
         )
 
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What its behaviour depends on, as JSON values."""
+        certificate = self.certificate
+        return {
+            "params": asdict(self.params),
+            "beam": asdict(self.beam),
+            "robot": asdict(self.robot),
+            "task": asdict(self.task),
+            "certificate": None if certificate is None else asdict(certificate),
+        }
+
     def predict(
         self,
         observation: Array,
@@ -241,3 +254,12 @@ class TannerController:
                 f"gains with a spectral radius below 1 over a sample (here {radius:.5f})",
                 "Lower k1 or k2, or assume less damping in the force law.",
             )
+
+
+def make_controller(
+    config: TransportConfig, certificate: Certificate | None = None
+) -> TannerController:
+    """The paper's controller: velocity field, tracking and PI force loop."""
+    return TannerController(
+        beam=config.beam, robot=config.believed_robot, task=config.task, certificate=certificate
+    )

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from defmanip_gym.evaluation.conditions import NOMINAL
 from defmanip_gym.evaluation.plots.panel import BAND, BOUND, FAINT, panel, title
 from defmanip_gym.evaluation.plots.swing import sigma_rad
 from defmanip_gym.evaluation.protection import Protection
-from defmanip_gym.evaluation.suites import NOMINAL
 from defmanip_gym.evaluation.traces import Trace
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import Certificate

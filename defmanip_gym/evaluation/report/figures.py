@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from defmanip_gym.evaluation.analysis import SuiteAnalysis
 from defmanip_gym.evaluation.contestant import Contestant
-from defmanip_gym.evaluation.contestants import FILTER_OPTION
+from defmanip_gym.evaluation.options import FILTER_OPTION
 from defmanip_gym.evaluation.plots.condition_scores import (
     plot_score_by_condition,
     plot_success_by_condition,
