@@ -11,6 +11,12 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
+from defmanip_gym.baselines.registry import (
+    identity_of,
+    make_controller,
+    registered_controllers,
+)
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.tune_config import TuneConfig
@@ -91,11 +97,20 @@ def is_as_in_the_file(trial: optuna.Trial | FrozenTrial) -> bool:
 
 def _settings(config: TuneConfig) -> dict[str, Any]:
     """Return all that a trial's score depends on besides what is varied, as JSON keeps it."""
-    hyperparameters = load_hyperparameters(None, config.algo, config.env)
     names = ("timesteps", "evaluations", "evaluation_episodes", "seed")
     settings = {name: getattr(config, name) for name in names}
-    settings |= {"package_version": __version__, "hyperparameters": hyperparameters}
+    settings |= {"package_version": __version__, "hyperparameters": _varied(config)}
     return json.loads(json.dumps(settings))
+
+
+def _varied(config: TuneConfig) -> dict[str, Any]:
+    """Return what the trials vary some values of."""
+    if not config.is_analytic:
+        return load_hyperparameters(None, config.algo, config.env)
+    reference = registered_controllers()[config.algo]
+    identity = identity_of(reference, make_controller(reference, TransportConfig()))
+    told = identity["identity"] or {}
+    return dict(told.get("params", {}))
 
 
 def _differences(stored: Any, settings: dict[str, Any]) -> str:

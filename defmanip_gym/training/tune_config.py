@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Literal, cast, get_args
 
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.training.config import Recipe, TrainConfig
 from defmanip_gym.validation import require_choice, require_whole, settle
+
+AnalyticName = Literal["tanner"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,22 +19,26 @@ class TuneConfig:
 
     A trial trains for --timesteps steps and is scored on starts that neither training nor any suite
     uses: the mean over episodes of the share of time left when the goal was reached, 0 if it was
-    not.
+    not. An analytic controller is scored on the same starts in the same way and gets as many steps
+    of the environment, --trials times --timesteps; since it need not train, that makes more trials.
 
     Examples:
         defmanip tune --algo ppo --trials 20
 
+        defmanip tune --algo tanner
+
         defmanip tune --algo sac --trials 10 --timesteps 200000 --output runs/tuning
     """
 
-    algo: Recipe = "ppo"
-    """Recipe whose hyperparameters are varied."""
+    algo: Recipe | AnalyticName = "ppo"
+    """Recipe whose hyperparameters, or analytic controller whose design choices are varied."""
 
     env: str = ENV_ID
     """Environment id."""
 
     trials: int = 20
-    """Trials that the study has in the end, those of earlier runs included."""
+    """Trials that the study has in the end, those of earlier runs included; of an analytic
+    controller, trainings whose steps it may take."""
 
     timesteps: int = 500_000
     """Environment steps of a trial."""
@@ -52,6 +59,7 @@ class TuneConfig:
     """Threads for physics, 0 for one per CPU."""
 
     def __post_init__(self) -> None:
+        require_choice("algo", self.algo, (*get_args(Recipe), *get_args(AnalyticName)))
         require_choice("env", self.env, ENV_IDS)
         settle(self, "trials", require_whole, 1)
         settle(self, "timesteps", require_whole, 1)
@@ -62,7 +70,7 @@ class TuneConfig:
     def training(self) -> TrainConfig:
         """How a trial trains."""
         return TrainConfig(
-            algo=self.algo,
+            algo="ppo" if self.is_analytic else cast(Recipe, self.algo),
             env=self.env,
             seed=self.seed,
             total_timesteps=self.timesteps,
@@ -70,6 +78,16 @@ class TuneConfig:
             evaluation_episodes=self.evaluation_episodes,
             num_threads=self.num_threads,
         )
+
+    @property
+    def is_analytic(self) -> bool:
+        """Whether a controller is tuned that nobody trains."""
+        return self.algo in get_args(AnalyticName)
+
+    @property
+    def step_budget(self) -> int:
+        """Steps of the environment that all trials may take together."""
+        return self.trials * self.timesteps
 
     @property
     def command(self) -> str:

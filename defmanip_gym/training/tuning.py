@@ -14,6 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.files import write_atomically
+from defmanip_gym.training.analytic_trials import analytic_objective, steps_taken
 from defmanip_gym.training.environments import make_evaluation_env, make_training_env
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model, callbacks_of
@@ -28,6 +29,8 @@ from defmanip_gym.training.tune_config import TuneConfig
 from defmanip_gym.training.validation_callback import ValidationCallback
 
 TABLE_FILE = "trials.md"
+_SHOWN = 5  # the best trials of an analytic controller
+_MOST_TRIALS = 10_000  # of an analytic controller, if all its gains were given up
 _AS_IN_THE_FILE = "as in the file"  # shown of a trial that varies nothing
 
 
@@ -82,6 +85,8 @@ class _Watch(BaseCallback):
 
 def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> None:
     missing = config.trials - len(finished_trials(study))
+    if config.is_analytic:
+        missing = int(_steps_left(config, study) > 0) and _MOST_TRIALS
     if missing <= 0:
         return
     begin_with_the_file(study)
@@ -89,6 +94,8 @@ def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> N
     def tell(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:
         value = "given up" if trial.value is None else f"{trial.value:.3f}"
         console.print(f"trial {trial.number}: {value}  {trial.params}", highlight=False)
+        if config.is_analytic and _steps_left(config, study) <= 0:
+            study.stop()
 
     study.optimize(
         lambda trial: _objective(config, trial),
@@ -97,7 +104,14 @@ def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> N
     )
 
 
+def _steps_left(config: TuneConfig, study: optuna.Study) -> int:
+    """Return how many steps of the environment an analytic controller's study still has."""
+    return config.step_budget - steps_taken(finished_trials(study))
+
+
 def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
+    if config.is_analytic:
+        return analytic_objective(config, trial)
     training = config.training
     hyperparameters = load_hyperparameters(None, config.algo, config.env)
     if not is_as_in_the_file(trial):
@@ -122,14 +136,23 @@ def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
 
 
 def study_table(study: optuna.Study, config: TuneConfig) -> str:
-    """Return all finished trials as a Markdown table, the best first."""
+    """Return finished trials as a Markdown table, the best first; of many, the best and the first.
+
+    An analytic controller's study has hundreds.
+    """
     trials = sorted(
         finished_trials(study),
         key=lambda trial: (trial.value is None, -(trial.value or 0.0)),
     )
+    count = len(trials)
+    if config.is_analytic:
+        trials = [t for rank, t in enumerate(trials) if rank < _SHOWN or is_as_in_the_file(t)]
     names = sorted({name for trial in trials for name in trial.params})
     header = ["trial", "score", *names]
-    lines = [f"`{config.command}`", "", _row(header), _row(["---"] * len(header))]
+    made = f"`{config.command}`: {count} trials"
+    if config.is_analytic:
+        made += f", {steps_taken(finished_trials(study)):,} steps"
+    lines = [made, "", _row(header), _row(["---"] * len(header))]
     for trial in trials:
         value = "given up" if trial.value is None else f"{trial.value:.3f}"
         cells = [_cell(trial.params.get(name)) for name in names]

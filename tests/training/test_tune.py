@@ -1,9 +1,14 @@
 """A study goes on where it stopped, begins with the file's own values, and tells of all trials."""
 
+import re
+from typing import get_args
+
+import numpy as np
 import optuna
 import pytest
 import yaml
 
+from defmanip_gym.baselines.registry import registered_controllers
 from defmanip_gym.errors import ParameterError, RunFolderError
 from defmanip_gym.training import study as studies
 from defmanip_gym.training import tuning
@@ -11,8 +16,8 @@ from defmanip_gym.training.config import ALGORITHM_OF
 from defmanip_gym.training.environments import make_training_env
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model
-from defmanip_gym.training.search_spaces import SEARCH_SPACES
-from defmanip_gym.training.tune_config import TuneConfig
+from defmanip_gym.training.search_spaces import ANALYTIC_SPACES, SEARCH_SPACES
+from defmanip_gym.training.tune_config import AnalyticName, TuneConfig
 
 
 @pytest.fixture
@@ -156,3 +161,19 @@ def test_bad_settings_are_refused_by_name(quick, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RunFolderError, match="output"):
         tuning.run_tune(config(tmp_path, output=tmp_path / "file"))
+
+
+def test_an_analytic_controller_gets_a_recipes_steps_and_starts_as_it_stands(tmp_path):
+    settings = config(tmp_path, algo="tanner", trials=2, timesteps=1000, evaluation_episodes=2)
+    table = tuning.run_tune(settings).read_text()
+    count, steps = re.search(r"(\d+) trials, ([\d,]+) steps", table).groups()
+    assert int(steps.replace(",", "")) >= settings.step_budget
+    assert int(count) >= 2 and "as in the file" in table
+    assert tuning.run_tune(settings).read_text() == table  # nothing is left to run
+
+
+@pytest.mark.parametrize("name", sorted(ANALYTIC_SPACES))
+def test_every_analytic_search_space_makes_a_controller(name):
+    controller = ANALYTIC_SPACES[name](optuna.create_study().ask())
+    assert controller.predict(np.zeros((2, 21)))[0].shape == (2, 3)
+    assert name in get_args(AnalyticName) and name in registered_controllers()
