@@ -14,7 +14,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from defmanip_gym.baselines.analytic.tanner import TannerController
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.baselines.residual import corrected, required_periods
 from defmanip_gym.envs.config import TransportConfig
@@ -256,6 +256,10 @@ def _base_and_certificate(env: Any, method: str) -> tuple[TannerController, Cert
         config.beam, sigma_rad=config.sigma_rad, method=method, conditions=TRANSPORT_CONDITIONS
     )
     controller = TannerController(
-        beam=config.beam, robot=config.believed_robot, task=config.task, certificate=certificate
+        beam=config.beam,
+        robot=config.believed_robot,
+        task=config.task,
+        certificate=certificate,
+        params=GENTLE_PARAMS,
     )
     return controller, certificate

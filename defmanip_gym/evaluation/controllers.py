@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS
 from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import controller_of
@@ -111,7 +112,9 @@ class Learned:
     @property
     def identity(self) -> dict[str, Any]:
         """The network, and what is below a residual."""
-        base = None if self.certificate is None else certificate_identity(self.certificate)
+        base = None
+        if self.certificate is not None:
+            base = {"params": asdict(GENTLE_PARAMS), "certificate": asdict(self.certificate)}
         return {"controller": self.actor.digest, "base": base}
 
 
@@ -171,8 +174,3 @@ class RandomPerEpisode:
         """Return uniform actions in [-1, 1], (n, 3)."""
         rows = zip(self._controllers, observation, strict=True)
         return np.array([controller.predict(row)[0] for controller, row in rows]), state
-
-
-def certificate_identity(certificate: Certificate | None) -> dict[str, Any] | None:
-    """Return what a certificate enforces and for what, as JSON values."""
-    return None if certificate is None else asdict(certificate)

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.evaluation.conditions import Condition
@@ -45,7 +45,7 @@ def damping_study(max_duration_s: float) -> Part:
     for index, assumed in enumerate(ASSUMED_DAMPINGS):
         controller = TannerController(
             beam=config.beam,
-            params=TannerParams(force_law_damping=assumed),
+            params=replace(GENTLE_PARAMS, force_law_damping=assumed),
             require_stability=False,  # the last one is not stable: that is what is to be seen
         )
         loop = replace(controller.sampled_loop(), linearization_beam=config.believed_beam)
@@ -133,7 +133,7 @@ def l1_transport(max_duration_s: float) -> Part:
     )
     (episode,) = rollout(
         Entry(suite="reproduction", contestant="tanner/l1", family="analytic"),
-        TannerController(beam=beam, certificate=certificate),
+        TannerController(beam=beam, certificate=certificate, params=GENTLE_PARAMS),
         [scenario],
         config=config,
         horizon_s=min(_L1_HORIZON_S, max_duration_s),
@@ -180,7 +180,7 @@ def settings_of_studies() -> Numbers:
     """Return what the studies depend on besides the package version."""
     return {
         "dampings": ASSUMED_DAMPINGS,
-        "params": asdict(TannerParams()),
+        "params": asdict(GENTLE_PARAMS),
         "certificate": asdict(l1_certificate()),
         "durations_s": (_STUDY_S, _L1_HORIZON_S, _SHORT_PIECE_S),
         "first_swing_rad": _FIRST_SWING_RAD,

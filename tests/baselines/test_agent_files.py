@@ -8,7 +8,7 @@ import pytest
 from safetensors.numpy import load_file, save_file
 from small_agents import CARD, small_agent
 
-from defmanip_gym.baselines.analytic.tanner import TannerController
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.learned.agents import controller_of, load_agent, load_family
 from defmanip_gym.baselines.learned.card import Normalization, SuiteScore
 from defmanip_gym.baselines.learned.families import shipped_families, write_card
@@ -208,7 +208,9 @@ def test_a_residual_agent_corrects_the_papers_controller():
     certificate = certify(BeamParams(), method="l1", conditions=TRANSPORT_CONDITIONS)
     agent = small_agent(certificate="l1", residual_authority_m_s2=0.3)
     observation = np.random.default_rng(0).normal(size=(4, 22))
-    base, state = TannerController(certificate=certificate).predict(observation)
+    base, state = TannerController(certificate=certificate, params=GENTLE_PARAMS).predict(
+        observation
+    )
     expected = np.clip(base + 0.3 / 3.0 * agent.predict(observation)[0], -1.0, 1.0)
     action, next_state = controller_of(agent).predict(observation)
     assert action == pytest.approx(expected, abs=1e-12)

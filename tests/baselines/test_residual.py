@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from defmanip_gym.baselines.analytic.tanner import TannerController
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import ZeroController
 from defmanip_gym.baselines.residual import ResidualController, corrected
 from defmanip_gym.baselines.residual_action import (
@@ -90,7 +90,7 @@ def test_training_environment_does_what_the_controller_does_later(certificate):
     )
     later = NuMaxVectorActionScaling(make(num_envs=2, max_episode_steps=40), certificate)
     controller = ResidualController(
-        TannerController(certificate=certificate),
+        TannerController(certificate=certificate, params=GENTLE_PARAMS),
         residual,
         authority=residual_authority(certificate, TransportConfig(), 2.0),
         decision_periods=5,

@@ -89,6 +89,18 @@ class TannerParams:
         settle(self, "force_law_damping", require_number, -1e4, 1e4, "N m s/rad")
 
 
+# As first chosen, by hand: what shipped residual agents correct, and what the reproduction runs.
+GENTLE_PARAMS = TannerParams(
+    tracking_gain=2.0,
+    approach_rate=0.5,
+    gains=ForceLoopGains(k1=0.5, k2=2.0),
+    acceleration_bound=1.0,
+    yaw_rate_bound=1.0,
+    bound_share=0.85,
+    deceleration_share=0.5,
+)
+
+
 class TannerController:
     """Velocity-field tracking with PI force feedback, within a certificate's bounds if given one.
 

@@ -6,7 +6,7 @@ import os
 import zipfile
 from pathlib import Path
 
-from defmanip_gym.baselines.analytic.tanner import TannerController
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.baselines.learned.actor import CARD_SUFFIX, TENSOR_SUFFIX, MlpActor, load_actor
 from defmanip_gym.baselines.learned.families import (
@@ -124,7 +124,7 @@ def controller_of(
         certificate = certify(
             BeamParams(), method=card.certificate, conditions=TRANSPORT_CONDITIONS
         )
-    base: Controller = TannerController(certificate=certificate)
+    base: Controller = TannerController(certificate=certificate, params=GENTLE_PARAMS)
     authority = card.residual_authority_m_s2 / TaskParams().max_acceleration_m_s2
     return ResidualController(
         base, actor, authority=authority, decision_periods=card.residual_decision_periods
