@@ -104,7 +104,7 @@ def test_the_analytic_controller_reaches_the_goal():
     assert record.success and record.final_distance_m < 0.05
     assert record.path_length_m > 9.0
     assert record.score == pytest.approx(record.start_distance_m / record.time_to_goal_s / 2.0)
-    assert 30.0 < record.peak_grasp_force_n < 40.0
+    assert 30.0 < record.peak_grasp_force_n < 45.0  # the weight, and 3 m/s² of a part of it
     assert record.energy_j > 0
 
 

@@ -1,12 +1,14 @@
 """No policy inside the wrapper violates the certificate, and the wrapper says what it did."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
+from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.errors import ActionError, CertificateError
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
@@ -88,7 +90,7 @@ def test_motion_stays_within_the_conditions():
 
 def test_a_controller_within_the_bounds_is_left_alone():
     env = batch()
-    controller = TannerController(certificate=L1, params=TannerParams(bound_share=0.7))
+    controller = TannerController(certificate=L1, params=replace(GENTLE_PARAMS, bound_share=0.7))
     observation, _ = env.reset(seed=0)
     state = None
     for k in range(200):

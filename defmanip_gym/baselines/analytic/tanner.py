@@ -44,6 +44,8 @@ FieldKind = Literal["normalized", "literal"]
 class TannerParams:
     """Design choices of the controller that are not the robot's or the object's.
 
+    The defaults are what a study found (docs/training.md).
+
     Attributes:
         velocity_field: ``"normalized"`` travels the dipole's streamlines with a speed profile,
             ``"literal"`` is −k ∇φ as printed.
@@ -62,15 +64,15 @@ class TannerParams:
 
     velocity_field: FieldKind = "normalized"
     literal_k: float = 1.0
-    tracking_gain: float = 2.0
-    approach_rate: float = 0.5
+    tracking_gain: float = 6.0
+    approach_rate: float = 3.0
     feedforward: bool = True
-    gains: ForceLoopGains = field(default_factory=lambda: ForceLoopGains(k1=0.5, k2=2.0))
+    gains: ForceLoopGains = field(default_factory=lambda: ForceLoopGains(k1=0.05, k2=8.0))
     force_law_damping: float = 0.0
-    acceleration_bound: float = 1.0
-    yaw_rate_bound: float = 1.0
+    acceleration_bound: float = 3.0
+    yaw_rate_bound: float = 2.5
     bound_share: float = 0.85
-    deceleration_share: float = 0.5
+    deceleration_share: float = 0.68
 
     def __post_init__(self) -> None:
         require_choice("velocity_field", self.velocity_field, get_args(FieldKind))
