@@ -22,6 +22,7 @@ from defmanip_gym.validation import require_choice, require_params, settle
 
 ControlMode = Literal["task", "force"]
 ConstraintMode = Literal["terminate", "penalty", "cost"]
+InnerLoopKind = Literal["model", "measured_force"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +33,12 @@ class TransportConfig:
     them. ``robot`` and ``beam`` are true, the beam but for what ``beam_ranges`` vary;
     ``nominal_robot`` and ``nominal_beam`` are what the built-in feedback linearization believes. By
     default it believes the truth, except that it counts on no damping at the root: overestimated
-    damping destabilizes the swing.
+    damping destabilizes the swing. ``inner_loop="measured_force"`` takes the grasp force as the
+    sensor reads it, noise included, in the place of any belief about the beam.
     """
 
     control_mode: ControlMode = "task"
+    inner_loop: InnerLoopKind = "model"
     constraint_mode: ConstraintMode = "terminate"
     sigma_rad: float = math.pi / 6
     robot: RobotParams = field(default_factory=RobotParams)
@@ -59,6 +62,7 @@ class TransportConfig:
             if not (optional and getattr(self, name) is None):
                 settle(self, name, require_params, kind)
         require_choice("control_mode", self.control_mode, get_args(ControlMode))
+        require_choice("inner_loop", self.inner_loop, get_args(InnerLoopKind))
         require_choice("constraint_mode", self.constraint_mode, get_args(ConstraintMode))
         object.__setattr__(self, "sigma_rad", validated_sigma(self.sigma_rad))
         if self.task.start.largest_swing_rad > self.sigma_rad:

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
+from defmanip_gym.envs.config import ConstraintMode, ControlMode, InnerLoopKind, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
 from defmanip_gym.envs.rendering.modes import RENDER_MODES, RenderModes
@@ -42,6 +42,8 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     point, Eq. (29), over `task.max_acceleration_m_s2` (3 m/s²). A built-in feedback linearization
     with nominal parameters, Eq. (28), turns it into forces; a limiter keeps the grasp below
     `task.max_speed_m_s` (2 m/s, to within 3 % as the beam swings) and never hinders braking.
+    `inner_loop="measured_force"` has no model of the beam: it takes the grasp force as it was last
+    observed, sensor noise included, Eqs. (2), (3). It changes only what is between w and forces.
 
     | Num | Action                          | Min | Max | Unit    |
     | --- | ------------------------------- | --- | --- | ------- |
@@ -123,6 +125,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | camera_name     | `None`, `"track"` | `"track"`, `"side"`, `"top"`, `"grasp"`, `"overview"` |
     | default_camera_config | `None`     | free camera: `FreeCameraParams` or their mapping       |
     | control_mode    | `"task"`         | `"task"` or `"force"`                                  |
+    | inner_loop      | `"model"`        | `"model"` or `"measured_force"`                        |
     | constraint_mode | `"terminate"`    | `"terminate"`, `"penalty"` or `"cost"`                 |
     | sigma_rad       | π/6              | σ, admissible swing, between 0 and π/3                 |
     | robot           | `RobotParams()`  | true robot                                             |
@@ -151,6 +154,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         camera_name: str | None = None,
         default_camera_config: FreeCameraParams | Mapping[str, Any] | None = None,
         control_mode: ControlMode = "task",
+        inner_loop: InnerLoopKind = "model",
         constraint_mode: ConstraintMode = "terminate",
         sigma_rad: float = math.pi / 6,
         robot: RobotParams = RobotParams(),
@@ -175,6 +179,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         self.camera_id, self.camera_name = view.camera_id, view.camera_name
         self.config = TransportConfig(
             control_mode=control_mode,
+            inner_loop=inner_loop,
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
             robot=robot,

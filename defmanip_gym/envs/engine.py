@@ -73,6 +73,8 @@ class TransportEngine:
         self.generators = EpisodeGenerators(num_envs)
         self._starts = StartSampler(config.task.start, self.generators)
         self._noise = SensorNoise(config.disturbance, self.layout, self.generators)
+        # what the inner loop feels is its own: observations are their receivers' to change
+        self._felt_force_b = np.zeros((num_envs, 3))
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
@@ -178,6 +180,7 @@ class TransportEngine:
         self._fill_scores(ids, *self._at_rest, before=self._scores)
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
+        self._felt_force_b[ids] = self._observed_force_b(self._scores)[ids]
         return self._scores.observations, self.info
 
     def draw_from(self, generators: Sequence[np.random.Generator]) -> None:
@@ -192,6 +195,8 @@ class TransportEngine:
     def get_state(self) -> dict[str, Any]:
         """Return all that the future of the episodes depends on, arrays (n, ...)."""
         scores = self._scores
+        observations = scores.observations.copy()
+        self.layout.part(observations, "grasp_force_b")[:] = self._felt_force_b
         return {
             "is_started": self._is_started,
             "steps": self._steps.copy(),
@@ -201,7 +206,7 @@ class TransportEngine:
             "beams": self._beams.get_state(),
             "simulation": self.simulation.get_state(),
             "plant": self._plant.copy()._asdict(),
-            "observations": scores.observations.copy(),
+            "observations": observations,
             "flags": scores.flags.T.copy(),
             "numbers": scores.numbers.T.copy(),
         }
@@ -230,6 +235,7 @@ class TransportEngine:
             np.ascontiguousarray(state["flags"].T),
             np.ascontiguousarray(state["numbers"].T),
         )
+        self._felt_force_b[:] = self._observed_force_b(self._scores)
         self._steps = state["steps"]
         self._is_started = state["is_started"]
 
@@ -251,7 +257,9 @@ class TransportEngine:
         """
         self._require_start()
         forces = self.simulation.generalized_forces
-        actions = self._inner_loop.write_forces(actions, self._plant, forces, idle=idle)
+        actions = self._inner_loop.write_forces(
+            actions, self._plant, forces, grasp_force_b=self._felt_force_b, idle=idle
+        )
         before = self._scores
         if self.config.disturbance.has_force:
             self.simulation.push_grasp(disturbing_force(self.config, self._steps))
@@ -265,6 +273,7 @@ class TransportEngine:
         self._fill_scores(self._all, actions, failed, before=before)
         awake = self._all if idle is None else np.flatnonzero(~idle)
         self._noise.add(self._scores.observations, awake)
+        self._felt_force_b[:] = self._observed_force_b(self._scores)
         return self._scores
 
     def _fill_scores(self, ids: Ids, actions: Array, failed: BoolArray, *, before: Scores) -> None:
@@ -281,6 +290,9 @@ class TransportEngine:
             before,
             self._scores,
         )
+
+    def _observed_force_b(self, scores: Scores) -> Array:
+        return self.layout.part(scores.observations, "grasp_force_b")
 
     def _require_start(self) -> None:
         if not self._is_started:

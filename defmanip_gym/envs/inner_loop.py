@@ -19,6 +19,7 @@ from defmanip_gym.theory.dynamics.feedback_linearization import (
     StateRoom,
     generalized_forces_at,
 )
+from defmanip_gym.theory.dynamics.measured_force import add_grasp_force_at
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
 from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
 from defmanip_gym.validation import number_array
@@ -50,11 +51,12 @@ class InnerLoop:
         self._mode, task = config.control_mode, config.task
         self.action_size = 3 if self._mode == "task" else 4
         self._shape = (num_envs, self.action_size)
+        self._measures_force = config.inner_loop == "measured_force"
         self._force_limits = np.array(config.robot.force_limits)
         reach_m, _ = config.goal_reach_and_height_m
         linearization = FeedbackLinearization(
             config.believed_robot,
-            config.believed_beam,
+            None if self._measures_force else config.believed_beam,
             RedundancyResolution(config.believed_robot, goal_reach_m=reach_m),
         )
         self._constants = LoopConstants(
@@ -66,13 +68,17 @@ class InnerLoop:
         )
         actions = np.empty(self._shape)
         segments = config.beam.segment_count
-        self._state = StateRoom.empty(segments)
+        self._state = StateRoom.empty(len(linearization.model.d_o22))
         plant = PlantState.empty(num_envs, segments)
         if self._mode == "force":  # whose first environment need not wait for the linearization
             self._scale = machine_code(_scale, self._force_limits, actions, forces)
         else:
             self._linearize = machine_code(
                 _linearize, self._constants, actions, plant, self._state, forces
+            )
+        if self._mode == "task" and self._measures_force:
+            self._add_force = machine_code(
+                _add_grasp_force, self._constants, plant, np.empty((num_envs, 3)), forces
             )
 
     def write_forces(
@@ -81,14 +87,17 @@ class InnerLoop:
         plant: PlantState,
         forces: Array,
         *,
+        grasp_force_b: Array,
         idle: BoolArray | None = None,
     ) -> Array:
-        """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28).
+        """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28) or (2).
 
         Args:
             actions: as given to the environment.
-            plant: the true state, which the feedback linearization measures without noise.
+            plant: the true state, whose motion the linearization measures without noise.
             forces: the simulation's ``generalized_forces``, as they were if it raises.
+            grasp_force_b: what the force sensor last read, (n, 3) N; looked at only by the inner
+                loop ``"measured_force"``.
             idle: whose action does not matter, whatever it is, and counts as zero, (n,).
 
         Returns:
@@ -104,6 +113,8 @@ class InnerLoop:
             are_finite = self._scale(self._force_limits, values, forces)
         else:
             are_finite = self._linearize(self._constants, values, plant, self._state, forces)
+            if are_finite and self._measures_force:
+                self._add_force(self._constants, plant, grasp_force_b, forces)
         if not are_finite:
             raise ActionError(
                 "action",
@@ -186,3 +197,12 @@ def _linearize(
         fore = upper + (plant.joints[i, 1] + half * plant.joint_rates[i, 1])
         generalized_forces_at(loop.model, w_forward, w_left, w_up, upper, fore, state, forces, i)
     return True
+
+
+@compiled
+def _add_grasp_force(loop: LoopConstants, plant: PlantState, force_b: Array, forces: Array) -> None:
+    half = 0.5 * loop.period_s  # where the forces are taken, as above
+    for i in range(len(forces)):
+        upper = plant.joints[i, 0] + half * plant.joint_rates[i, 0]
+        fore = upper + (plant.joints[i, 1] + half * plant.joint_rates[i, 1])
+        add_grasp_force_at(loop.model.arm, upper, fore, force_b, forces, i)

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from defmanip_gym.envs.config import ConstraintMode, ControlMode, TransportConfig
+from defmanip_gym.envs.config import ConstraintMode, ControlMode, InnerLoopKind, TransportConfig
 from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
@@ -63,6 +63,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         camera_name: see there.
         default_camera_config: see there.
         control_mode: see there.
+        inner_loop: see there.
         constraint_mode: see there.
         sigma_rad: see there.
         robot: see there.
@@ -94,6 +95,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         camera_name: str | None = None,
         default_camera_config: FreeCameraParams | Mapping[str, Any] | None = None,
         control_mode: ControlMode = "task",
+        inner_loop: InnerLoopKind = "model",
         constraint_mode: ConstraintMode = "terminate",
         sigma_rad: float = math.pi / 6,
         robot: RobotParams = RobotParams(),
@@ -125,6 +127,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.config = TransportConfig(
             control_mode=control_mode,
+            inner_loop=inner_loop,
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
             robot=robot,

@@ -148,6 +148,7 @@ def _environment(
         autoreset_mode=AutoresetMode.DISABLED,
         num_threads=num_threads,
         control_mode=config.control_mode,
+        inner_loop=config.inner_loop,
         constraint_mode=config.constraint_mode,
         sigma_rad=config.sigma_rad,
         robot=config.robot,

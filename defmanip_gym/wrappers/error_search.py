@@ -140,8 +140,12 @@ class ErrorSearch:
     def _advance(self, command: Array, before: Array) -> tuple[Array, Array]:
         """Step a control period; return the observation at its end and the mean stray, (n,) m/s."""
         task, simulation = self._config.task, self._simulation
+        plant = simulation.read()
         self._inner_loop.write_forces(
-            command / task.max_acceleration_m_s2, simulation.read(), simulation.generalized_forces
+            command / task.max_acceleration_m_s2,
+            plant,
+            simulation.generalized_forces,
+            grasp_force_b=self._felt_force_b(plant.grasp_force_b),
         )
         if self._config.disturbance.has_force:
             simulation.push_grasp(disturbing_force(self._config, self._steps))
@@ -160,6 +164,13 @@ class ErrorSearch:
         line = velocities[0] + shares * (velocities[-1] - velocities[0])
         stray = np.abs(np.array(velocities) - line)[:, :, 0].mean(axis=0)
         return observation, stray
+
+    def _felt_force_b(self, force_b: Array) -> Array:
+        """Return what the force sensor reads, whose noise only one of the inner loops passes on."""
+        noise_n = self._config.disturbance.force_sensor_noise_n
+        if self._config.inner_loop == "model" or not noise_n:
+            return force_b
+        return force_b + noise_n * self._rng.standard_normal(force_b.shape)
 
     def _observed(self) -> Array:
         return clean_observations(self._config, self._simulation.read())

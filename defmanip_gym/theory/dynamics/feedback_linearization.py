@@ -78,20 +78,20 @@ class FeedbackLinearization:
     Args:
         robot: nominal robot.
         beam: nominal beam; overestimating its damping takes damping from the real one
-            (docs/derivations.md).
+            (docs/derivations.md). None for the robot alone, Eq. (2), whose swing is (n, 0).
         resolution: how base and arm share the task.
     """
 
     def __init__(
-        self, robot: RobotParams, beam: BeamParams, resolution: RedundancyResolution
+        self, robot: RobotParams, beam: BeamParams | None, resolution: RedundancyResolution
     ) -> None:
-        carried = HangingBeam(beam)
+        carried = None if beam is None else HangingBeam(beam)
         self.model = NominalModel(
             chain=robot_chain(robot, beam).constants,
             arm=resolution.kinematics.lengths,
             rule=resolution.rule,
-            d_o22=carried.d_o22,
-            k_o22=carried.k_o22,
+            d_o22=np.zeros((0, 0)) if carried is None else carried.d_o22,
+            k_o22=np.zeros((0, 0)) if carried is None else carried.k_o22,
         )
 
     def generalized_forces(
