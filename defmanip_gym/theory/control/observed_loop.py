@@ -1,0 +1,169 @@
+"""Stability of tracking with a disturbance observer over either inner loop, sample by sample.
+
+About rest at the goal in all three axes of the base frame. With b(z2) what the object's springs,
+dampers and weight do to the grasp, (𝓜 + m̃_o11) ẍ_a + b = 𝒯 − 𝓒 for the true object, and
+
+    inner loop "model", Eq. (28):     𝒯 − 𝓒 = (𝓜 + m̃̂_o11) w + b̂ half a period ahead
+    inner loop "measured_force":      𝒯 − 𝓒 = 𝓜 w + F[k],   F[k] = m̃_o11 ẍ_a[k−] + b[k]
+
+so that the measured force closes a loop of its own with the poles of (𝓜 + m̃_o11)⁻¹ m̃_o11, all in
+[0, 1): stable for every object, and the slower the heavier it is (docs/derivations.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_lyapunov
+
+from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
+from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.task_space import task_inertia
+from defmanip_gym.theory.payload.object_model import HangingBeam
+
+_AXES = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class HangingObject:
+    """A beam about rest: b(z2) = −m_o12 m_o22⁻¹ (K φ + D φ̇) and how it follows the grasp.
+
+    Attributes:
+        coupling: m_o12, (3, N) kg·m.
+        apparent: m̃_o11, (3, 3) kg.
+        follows: m_o22⁻¹ m_o12ᵀ, (N, 3) 1/m.
+        stiffness: K with gravity's, (N, N) N·m/rad.
+        damping: D, (N, N) N·m·s/rad.
+        inertia: m_o22, (N, N) kg·m².
+        centre: velocity of the centre of mass about the grasp per φ̇, (3, N) m.
+    """
+
+    coupling: Array
+    apparent: Array
+    follows: Array
+    stiffness: Array
+    damping: Array
+    inertia: Array
+    centre: Array
+
+    @classmethod
+    def of(cls, beam: BeamParams) -> HangingObject:
+        """Return that of a beam."""
+        model, rest = HangingBeam(beam), np.zeros(beam.segment_count)
+        partition = model.partition(rest, rest, np.zeros(()))
+        gravity = GRAVITY_M_S2 * np.diag(model.chain.constants.first_moments)
+        return cls(
+            coupling=partition.m_o12,
+            apparent=model.apparent_inertia(partition),
+            follows=np.linalg.solve(partition.m_o22, partition.m_o12.T),
+            stiffness=model.k_o22 + gravity,
+            damping=model.d_o22,
+            inertia=partition.m_o22,
+            centre=partition.m_o12 / beam.mass_kg,
+        )
+
+    def force(self, ahead_s: float = 0.0) -> Array:
+        """Return b as a (3, 2N) matrix on (φ, φ̇), φ taken ``ahead_s`` later."""
+        damping = self.damping + ahead_s * self.stiffness
+        return -self.follows.T @ np.hstack((self.stiffness, damping))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObservedLoop:
+    """Linearization about rest at the goal of inner loop, tracking (20) and observer.
+
+    Attributes:
+        robot: true robot.
+        goal_pitch: (2,) rad, arm pitches at the goal.
+        beam: true beam.
+        believed_beam: by the inner loop (28); None for the one that measures the force.
+        tracking_gain: ε of Eq. (20), 1/s.
+        approach_rate: speed of the velocity field per distance near the goal, 1/s.
+        observer_gain: L, 1/s.
+        swing_damping: acceleration per speed of the object's centre about the grasp, 1/s.
+        period_s: control period T.
+        delay_periods: control periods until w takes effect.
+    """
+
+    robot: RobotParams
+    goal_pitch: Array
+    beam: BeamParams
+    believed_beam: BeamParams | None
+    tracking_gain: float
+    approach_rate: float
+    observer_gain: float
+    swing_damping: float
+    period_s: float
+    delay_periods: int = 0
+
+    def spectral_radius(self) -> float:
+        """Return the largest |eigenvalue| over one sample; the loop is stable below 1."""
+        return float(np.abs(np.linalg.eigvals(self.transition_matrix())).max())
+
+    def velocity_deviation(self, force_noise_n: float) -> Array:
+        """Return the standard deviation of the grasp's velocity, (3,) m/s, from a noisy force.
+
+        Args:
+            force_noise_n: standard deviation of each reading and axis, independent; it enters
+                where F does, so only in the loop that measures it.
+        """
+        advance, noise = self._maps()
+        spread = solve_discrete_lyapunov(advance, force_noise_n**2 * noise @ noise.T)
+        deviation: Array = np.sqrt(np.diag(spread)[_AXES : 2 * _AXES])
+        return deviation
+
+    def transition_matrix(self) -> Array:
+        """Return the map over a sample of (p, v, φ, φ̇, F, d, v_last, w under way); w_last leads."""
+        return self._maps()[0]
+
+    def _maps(self) -> tuple[Array, Array]:
+        """Return what the state and what the force sensor's noise become over a sample."""
+        true, half = HangingObject.of(self.beam), 0.5 * self.period_s
+        count = self.beam.segment_count
+        size = 2 * _AXES + 2 * count
+        M = task_inertia(self.robot, self.goal_pitch)
+        compliance = np.linalg.inv(M + true.apparent)
+        advance, forced = _held(true, -compliance @ true.force(), self.period_s)
+        if self.believed_beam is None:
+            feeds, shown, seen = M, np.zeros((_AXES, 2 * count)), np.eye(_AXES)
+        else:
+            believed = HangingObject.of(self.believed_beam)
+            feeds, shown = M + believed.apparent, believed.force(half)
+            seen = np.zeros((_AXES, _AXES))
+        step = self.period_s * self.observer_gain
+        under_way = max(1, self.delay_periods)
+
+        def one_sample(state: Array) -> Array:
+            x, (F, d, v_last, *queue) = state[:size], state[size:].reshape(-1, _AXES)
+            p, v, swing = x[:_AXES], x[_AXES : 2 * _AXES], x[2 * _AXES :]
+            d = d + step * ((v - v_last) / self.period_s - queue[-1] - d)
+            u_o = -self.tracking_gain * (v + self.approach_rate * p) - self.approach_rate * v
+            u_o = u_o + self.swing_damping * true.centre @ swing[count:]
+            queue = [*queue[-under_way:], u_o - d]
+            acting = queue[-1 - self.delay_periods]
+            held = compliance @ (feeds @ acting + shown @ swing + seen @ F)
+            after = advance @ x + forced @ held
+            swing = after[2 * _AXES :]
+            acceleration = held - compliance @ true.force() @ swing
+            F = true.apparent @ acceleration + true.force() @ swing
+            return np.concatenate((after, F, d, v, *queue[-under_way:]))
+
+        width = size + _AXES * (3 + under_way)
+        matrix = np.stack([one_sample(unit) for unit in np.eye(width)], axis=1)
+        return matrix, matrix[:, size : size + _AXES]
+
+
+def _held(true: HangingObject, reaction: Array, period_s: float) -> tuple[Array, Array]:
+    """Return what a period makes of (p, v, φ, φ̇) and of a held acceleration, (3,) m/s²."""
+    count = len(true.inertia)
+    size = 2 * _AXES + 2 * count
+    A = np.zeros((size, size))
+    A[:_AXES, _AXES : 2 * _AXES] = np.eye(_AXES)
+    A[_AXES : 2 * _AXES, 2 * _AXES :] = reaction
+    A[2 * _AXES : -count, -count:] = np.eye(count)
+    own = np.linalg.solve(true.inertia, np.hstack((true.stiffness, true.damping)))
+    A[-count:, 2 * _AXES :] = -own - true.follows @ reaction
+    B = np.vstack((np.zeros((_AXES, 3)), np.eye(3), np.zeros((count, 3)), -true.follows))
+    hold = expm(np.block([[A, B], [np.zeros((3, size + 3))]]) * period_s)
+    return hold[:size, :size], hold[:size, size:]
