@@ -13,9 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.control.control_laws import limit_speed
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.frames import base_to_world, world_to_base
+from defmanip_gym.theory.dynamics.task_space import task_inertia
 from defmanip_gym.validation import require_non_negative, require_positive, settle
 
 
@@ -55,17 +57,6 @@ class DisturbanceObserver:
         for name in ("period_s", "w_limit", "max_speed_m_s"):
             settle(self, name, require_positive)
 
-    def begin(self, estimate: Array, velocity_b: Array, heading: Array) -> ObserverMemory:
-        """Return the memory of n episodes that begin; only its estimate is looked at.
-
-        Args:
-            estimate: of d, (n, 3) m/s².
-            velocity_b: of the grasp, (n, 3) m/s, base frame.
-            heading: of that frame, (n,) rad.
-        """
-        velocity = base_to_world(velocity_b, heading)
-        return ObserverMemory(estimate=estimate, w=np.zeros_like(estimate), velocity=velocity)
-
     def updated(
         self, memory: ObserverMemory, velocity_b: Array, heading: Array, yaw_rate: Array
     ) -> Array:
@@ -94,3 +85,24 @@ class DisturbanceObserver:
             w=limit_speed(wished, velocity_b, self.max_speed_m_s, self.period_s),
             velocity=base_to_world(velocity_b, heading),
         )
+
+
+def weight_disturbance(robot: RobotParams, beam: BeamParams, pitch: Array, force_b: Array) -> Array:
+    """Return what a wrongly believed weight does to the grasp under Eq. (28), (n, 3) m/s².
+
+    Without it an arm that believes in another weight drops or lifts the object before the observer
+    has seen anything: at rest w = 0 gives (𝓜 + m̃_o11) ẍ_a = (m̂_o − m_o) g upwards. Across the
+    direction in which it swings an object shows its whole mass.
+
+    Args:
+        robot: as believed.
+        beam: as believed.
+        pitch: α of the arm, (n, 2) rad.
+        force_b: the force on the object at rest as read, (n, 3) N.
+    """
+    shown = task_inertia(robot, pitch)
+    shown[:, 2, 2] += force_b[:, 2] / GRAVITY_M_S2
+    missing = np.zeros_like(force_b)
+    missing[:, 2] = beam.mass_kg * GRAVITY_M_S2 - force_b[:, 2]
+    disturbance: Array = np.linalg.solve(shown, missing[..., None])[..., 0]
+    return disturbance

@@ -36,7 +36,7 @@ class HangingObject:
         stiffness: K with gravity's, (N, N) N·m/rad.
         damping: D, (N, N) N·m·s/rad.
         inertia: m_o22, (N, N) kg·m².
-        centre: velocity of the centre of mass about the grasp per φ̇, (3, N) m.
+        levers: x_c per φ, (3, N) m.
     """
 
     coupling: Array
@@ -45,7 +45,7 @@ class HangingObject:
     stiffness: Array
     damping: Array
     inertia: Array
-    centre: Array
+    levers: Array
 
     @classmethod
     def of(cls, beam: BeamParams) -> HangingObject:
@@ -60,7 +60,7 @@ class HangingObject:
             stiffness=model.k_o22 + gravity,
             damping=model.d_o22,
             inertia=partition.m_o22,
-            centre=partition.m_o12 / beam.mass_kg,
+            levers=partition.m_o12 / beam.mass_kg,
         )
 
     def force(self, ahead_s: float = 0.0) -> Array:
@@ -81,7 +81,7 @@ class ObservedLoop:
         tracking_gain: ε of Eq. (20), 1/s.
         approach_rate: speed of the velocity field per distance near the goal, 1/s.
         observer_gain: L, 1/s.
-        swing_damping: acceleration per speed of the object's centre about the grasp, 1/s.
+        following_rate: κ of swing following, 1/s.
         period_s: control period T.
         delay_periods: control periods until w takes effect.
     """
@@ -93,7 +93,7 @@ class ObservedLoop:
     tracking_gain: float
     approach_rate: float
     observer_gain: float
-    swing_damping: float
+    following_rate: float
     period_s: float
     delay_periods: int = 0
 
@@ -138,8 +138,10 @@ class ObservedLoop:
             x, (F, d, v_last, *queue) = state[:size], state[size:].reshape(-1, _AXES)
             p, v, swing = x[:_AXES], x[_AXES : 2 * _AXES], x[2 * _AXES :]
             d = d + step * ((v - v_last) / self.period_s - queue[-1] - d)
-            u_o = -self.tracking_gain * (v + self.approach_rate * p) - self.approach_rate * v
-            u_o = u_o + self.swing_damping * true.centre @ swing[count:]
+            following = self.following_rate * true.levers
+            desired = following @ swing[:count] - self.approach_rate * p
+            desired_rate = following @ swing[count:] - self.approach_rate * v
+            u_o = desired_rate - self.tracking_gain * (v - desired)
             queue = [*queue[-under_way:], u_o - d]
             acting = queue[-1 - self.delay_periods]
             held = compliance @ (feeds @ acting + shown @ swing + seen @ F)
