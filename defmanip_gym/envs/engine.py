@@ -73,8 +73,6 @@ class TransportEngine:
         self.generators = EpisodeGenerators(num_envs)
         self._starts = StartSampler(config.task.start, self.generators)
         self._noise = SensorNoise(config.disturbance, self.layout, self.generators)
-        # what the inner loop feels is its own: observations are their receivers' to change
-        self._felt_force_b = np.zeros((num_envs, 3))
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
@@ -180,7 +178,7 @@ class TransportEngine:
         self._fill_scores(ids, *self._at_rest, before=self._scores)
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
-        self._felt_force_b[ids] = self._observed_force_b(self._scores)[ids]
+        self._inner_loop.begin(ids, self._observed_force_b)
         return self._scores.observations, self.info
 
     def draw_from(self, generators: Sequence[np.random.Generator]) -> None:
@@ -195,8 +193,6 @@ class TransportEngine:
     def get_state(self) -> dict[str, Any]:
         """Return all that the future of the episodes depends on, arrays (n, ...)."""
         scores = self._scores
-        observations = scores.observations.copy()
-        self.layout.part(observations, "grasp_force_b")[:] = self._felt_force_b
         return {
             "is_started": self._is_started,
             "steps": self._steps.copy(),
@@ -206,7 +202,8 @@ class TransportEngine:
             "beams": self._beams.get_state(),
             "simulation": self.simulation.get_state(),
             "plant": self._plant.copy()._asdict(),
-            "observations": observations,
+            "inner_loop": self._inner_loop.get_state(self._plant),
+            "observations": scores.observations.copy(),
             "flags": scores.flags.T.copy(),
             "numbers": scores.numbers.T.copy(),
         }
@@ -235,7 +232,7 @@ class TransportEngine:
             np.ascontiguousarray(state["flags"].T),
             np.ascontiguousarray(state["numbers"].T),
         )
-        self._felt_force_b[:] = self._observed_force_b(self._scores)
+        self._inner_loop.set_state(state["inner_loop"])
         self._steps = state["steps"]
         self._is_started = state["is_started"]
 
@@ -257,9 +254,7 @@ class TransportEngine:
         """
         self._require_start()
         forces = self.simulation.generalized_forces
-        actions = self._inner_loop.write_forces(
-            actions, self._plant, forces, grasp_force_b=self._felt_force_b, idle=idle
-        )
+        actions = self._inner_loop.write_forces(actions, self._plant, forces, idle=idle)
         before = self._scores
         if self.config.disturbance.has_force:
             self.simulation.push_grasp(disturbing_force(self.config, self._steps))
@@ -273,7 +268,8 @@ class TransportEngine:
         self._fill_scores(self._all, actions, failed, before=before)
         awake = self._all if idle is None else np.flatnonzero(~idle)
         self._noise.add(self._scores.observations, awake)
-        self._felt_force_b[:] = self._observed_force_b(self._scores)
+        if self.config.inner_loop == "measured_force":
+            self._inner_loop.feel(self._plant_before, self._plant, self._observed_force_b)
         return self._scores
 
     def _fill_scores(self, ids: Ids, actions: Array, failed: BoolArray, *, before: Scores) -> None:
@@ -291,8 +287,9 @@ class TransportEngine:
             self._scores,
         )
 
-    def _observed_force_b(self, scores: Scores) -> Array:
-        return self.layout.part(scores.observations, "grasp_force_b")
+    @property
+    def _observed_force_b(self) -> Array:
+        return self.layout.part(self._scores.observations, "grasp_force_b")
 
     def _require_start(self) -> None:
         if not self._is_started:

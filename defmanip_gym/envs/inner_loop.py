@@ -19,6 +19,7 @@ from defmanip_gym.theory.dynamics.feedback_linearization import (
     StateRoom,
     generalized_forces_at,
 )
+from defmanip_gym.theory.dynamics.frames import turned
 from defmanip_gym.theory.dynamics.measured_force import add_grasp_force_at
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
 from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
@@ -26,6 +27,7 @@ from defmanip_gym.validation import number_array
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+Ids = NDArray[np.intp]
 
 
 class LoopConstants(NamedTuple):
@@ -36,6 +38,20 @@ class LoopConstants(NamedTuple):
     max_speed_m_s: float
     period_s: float
     arm: ArmLengths
+
+
+class FeltForce(NamedTuple):
+    """What the inner loop that measures the force remembers (compiled code takes named tuples).
+
+    Copies, since observations are their receivers' to change.
+
+    Attributes:
+        force_b: on the object as last read, sensor noise included, (n, 3) N.
+        acceleration_b: mean of the grasp's over the last period, (n, 3) m/s².
+    """
+
+    force_b: Array
+    acceleration_b: Array
 
 
 class InnerLoop:
@@ -67,6 +83,7 @@ class InnerLoop:
             arm=ArmLengths.of(config.robot),
         )
         actions = np.empty(self._shape)
+        self._felt = FeltForce(np.zeros((num_envs, 3)), np.zeros((num_envs, 3)))
         segments = config.beam.segment_count
         self._state = StateRoom.empty(len(linearization.model.d_o22))
         plant = PlantState.empty(num_envs, segments)
@@ -78,8 +95,37 @@ class InnerLoop:
             )
         if self._mode == "task" and self._measures_force:
             self._add_force = machine_code(
-                _add_grasp_force, self._constants, plant, np.empty((num_envs, 3)), forces
+                _add_grasp_force, self._constants, actions, plant, self._felt, forces
             )
+            self._feel = machine_code(
+                _feel, self._constants, plant, plant, np.empty((num_envs, 3)), self._felt
+            )
+
+    def begin(self, ids: Ids, force_b: Array) -> None:
+        """Note the first force readings, (n, 3) N, of episodes that begin at rest."""
+        self._felt.force_b[ids], self._felt.acceleration_b[ids] = force_b[ids], 0.0
+
+    def feel(self, before: PlantState, plant: PlantState, force_b: Array) -> None:
+        """Note what a period brought; only the inner loop ``"measured_force"`` needs it.
+
+        Args:
+            before: the true state at its beginning.
+            plant: and at its end.
+            force_b: what the force sensor reads at its end, (n, 3) N.
+        """
+        self._feel(self._constants, before, plant, np.ascontiguousarray(force_b), self._felt)
+
+    def get_state(self, plant: PlantState) -> dict[str, Array]:
+        """Return what was felt last; where it is not noted, the present force as if at rest."""
+        felt = self._felt
+        if not self._measures_force:
+            felt = FeltForce(plant.grasp_force_b, np.zeros_like(plant.grasp_force_b))
+        return {name: values.copy() for name, values in felt._asdict().items()}
+
+    def set_state(self, state: dict[str, Array]) -> None:
+        """Go on from what ``get_state`` returned."""
+        for name, values in self._felt._asdict().items():
+            values[:] = state[name]
 
     def write_forces(
         self,
@@ -87,7 +133,6 @@ class InnerLoop:
         plant: PlantState,
         forces: Array,
         *,
-        grasp_force_b: Array,
         idle: BoolArray | None = None,
     ) -> Array:
         """Write T_r, (n, 4): directly, or from the task acceleration by Eq. (28) or (2).
@@ -96,8 +141,6 @@ class InnerLoop:
             actions: as given to the environment.
             plant: the true state, whose motion the linearization measures without noise.
             forces: the simulation's ``generalized_forces``, as they were if it raises.
-            grasp_force_b: what the force sensor last read, (n, 3) N; looked at only by the inner
-                loop ``"measured_force"``.
             idle: whose action does not matter, whatever it is, and counts as zero, (n,).
 
         Returns:
@@ -114,7 +157,7 @@ class InnerLoop:
         else:
             are_finite = self._linearize(self._constants, values, plant, self._state, forces)
             if are_finite and self._measures_force:
-                self._add_force(self._constants, plant, grasp_force_b, forces)
+                self._add_force(self._constants, values, plant, self._felt, forces)
         if not are_finite:
             raise ActionError(
                 "action",
@@ -165,6 +208,34 @@ def _scale(limits: Array, actions: Array, forces: Array) -> bool:
     return are_finite
 
 
+@compilable
+def _grasp_velocity(
+    loop: LoopConstants, plant: PlantState, i: int
+) -> tuple[float, float, float]:
+    upper, upper_rate = plant.joints[i, 0], plant.joint_rates[i, 0]
+    fore, fore_rate = upper + plant.joints[i, 1], upper_rate + plant.joint_rates[i, 1]
+    u1, u2 = plant.base_velocity[i, 0], plant.base_velocity[i, 1]
+    return grasp_velocity(loop.arm, upper, fore, upper_rate, fore_rate, u1, u2)
+
+
+@compilable
+def _limited(
+    loop: LoopConstants, actions: Array, plant: PlantState, i: int
+) -> tuple[float, float, float]:
+    """Return the w that an action asks for, as far as the speed limit allows it."""
+    forward, left, up = _grasp_velocity(loop, plant, i)
+    return limited_acceleration(
+        actions[i, 0] * loop.max_acceleration_m_s2,
+        actions[i, 1] * loop.max_acceleration_m_s2,
+        actions[i, 2] * loop.max_acceleration_m_s2,
+        forward,
+        left,
+        up,
+        loop.max_speed_m_s,
+        loop.period_s,
+    )
+
+
 @compiled
 def _linearize(
     loop: LoopConstants, actions: Array, plant: PlantState, state: StateRoom, forces: Array
@@ -177,17 +248,7 @@ def _linearize(
         upper, upper_rate = plant.joints[i, 0], plant.joint_rates[i, 0]
         fore, fore_rate = upper + plant.joints[i, 1], upper_rate + plant.joint_rates[i, 1]
         u1, u2 = plant.base_velocity[i, 0], plant.base_velocity[i, 1]
-        forward, left, up = grasp_velocity(loop.arm, upper, fore, upper_rate, fore_rate, u1, u2)
-        w_forward, w_left, w_up = limited_acceleration(
-            actions[i, 0] * loop.max_acceleration_m_s2,
-            actions[i, 1] * loop.max_acceleration_m_s2,
-            actions[i, 2] * loop.max_acceleration_m_s2,
-            forward,
-            left,
-            up,
-            loop.max_speed_m_s,
-            loop.period_s,
-        )
+        w_forward, w_left, w_up = _limited(loop, actions, plant, i)
         state.velocity[0], state.velocity[1] = u1, u2
         state.velocity[2], state.velocity[3] = upper_rate, fore_rate
         for k in range(len(state.swing)):
@@ -200,9 +261,49 @@ def _linearize(
 
 
 @compiled
-def _add_grasp_force(loop: LoopConstants, plant: PlantState, force_b: Array, forces: Array) -> None:
+def _add_grasp_force(
+    loop: LoopConstants,
+    actions: Array,
+    plant: PlantState,
+    felt: FeltForce,
+    forces: Array,
+) -> None:
     half = 0.5 * loop.period_s  # where the forces are taken, as above
     for i in range(len(forces)):
         upper = plant.joints[i, 0] + half * plant.joint_rates[i, 0]
         fore = upper + (plant.joints[i, 1] + half * plant.joint_rates[i, 1])
-        add_grasp_force_at(loop.model.arm, upper, fore, force_b, forces, i)
+        w_forward, w_left, w_up = _limited(loop, actions, plant, i)
+        add_grasp_force_at(
+            loop.model.arm,
+            w_forward,
+            w_left,
+            w_up,
+            upper,
+            fore,
+            plant.swing[i, 0],
+            felt.force_b,
+            felt.acceleration_b,
+            forces,
+            i,
+        )
+
+
+@compiled
+def _feel(
+    loop: LoopConstants,
+    before: PlantState,
+    plant: PlantState,
+    reading_b: Array,
+    felt: FeltForce,
+) -> None:
+    """Note the mean acceleration of a period, base frame of its middle, and the force at its end."""
+    for i in range(len(reading_b)):
+        half = 0.5 * (plant.base_pose[i, 2] - before.base_pose[i, 2])
+        now, then = _grasp_velocity(loop, plant, i), _grasp_velocity(loop, before, i)
+        forward, left = turned(now[0], now[1], half)
+        forward_then, left_then = turned(then[0], then[1], -half)
+        felt.acceleration_b[i, 0] = (forward - forward_then) / loop.period_s
+        felt.acceleration_b[i, 1] = (left - left_then) / loop.period_s
+        felt.acceleration_b[i, 2] = (now[2] - then[2]) / loop.period_s
+        for k in range(3):
+            felt.force_b[i, k] = reading_b[i, k]

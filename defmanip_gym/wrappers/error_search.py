@@ -110,6 +110,8 @@ class ErrorSearch:
         self._moving = np.arange(count) >= len(resting.joints)
         self._place(resting, ~self._moving)
         self._place(moving, self._moving)
+        if config.inner_loop == "measured_force":  # of robots on their way it does not count yet
+            self._inner_loop.begin(np.arange(count), self._felt_force_b())
         self._steps = rng.integers(0, np.where(self._moving, _LATEST_START, 1))
         self._under_way = deque(np.zeros((delay_periods, count, 3)))
         self._periods, self._unknown = periods, 1 + delay_periods
@@ -145,7 +147,6 @@ class ErrorSearch:
             command / task.max_acceleration_m_s2,
             plant,
             simulation.generalized_forces,
-            grasp_force_b=self._felt_force_b(plant.grasp_force_b),
         )
         if self._config.disturbance.has_force:
             simulation.push_grasp(disturbing_force(self._config, self._steps))
@@ -159,17 +160,18 @@ class ErrorSearch:
             observation = self._observed()
             now = Sensed.observed(self._layout, observation)
             velocities.append(base_to_world(now.velocity_b, now.heading - start.heading))
+        if self._config.inner_loop == "measured_force":
+            self._inner_loop.feel(plant, simulation.read(), self._felt_force_b())
         self._steps = self._steps + 1
         shares = np.array(times)[:, None, None] / times[-1]
         line = velocities[0] + shares * (velocities[-1] - velocities[0])
         stray = np.abs(np.array(velocities) - line)[:, :, 0].mean(axis=0)
         return observation, stray
 
-    def _felt_force_b(self, force_b: Array) -> Array:
-        """Return what the force sensor reads, whose noise only one of the inner loops passes on."""
+    def _felt_force_b(self) -> Array:
+        """Return what the force sensor reads, (n, 3) N."""
+        force_b = self._simulation.read().grasp_force_b
         noise_n = self._config.disturbance.force_sensor_noise_n
-        if self._config.inner_loop == "model" or not noise_n:
-            return force_b
         return force_b + noise_n * self._rng.standard_normal(force_b.shape)
 
     def _observed(self) -> Array:

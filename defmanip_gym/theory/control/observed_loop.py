@@ -4,10 +4,11 @@ About rest at the goal in all three axes of the base frame. With b(z2) what the 
 dampers and weight do to the grasp, (𝓜 + m̃_o11) ẍ_a + b = 𝒯 − 𝓒 for the true object, and
 
     inner loop "model", Eq. (28):     𝒯 − 𝓒 = (𝓜 + m̃̂_o11) w + b̂ half a period ahead
-    inner loop "measured_force":      𝒯 − 𝓒 = 𝓜 w + F[k],   F[k] = m̃_o11 ẍ_a[k−] + b[k]
+    inner loop "measured_force":      𝒯 − 𝓒 = 𝓜 w + F[k] + m̂ (w − ẍ_a[k−1]),
+                                      F[k] = m̃_o11 ẍ_a[k−] + b[k]
 
-so that the measured force closes a loop of its own with the poles of (𝓜 + m̃_o11)⁻¹ m̃_o11, all in
-[0, 1): stable for every object, and the slower the heavier it is (docs/derivations.md).
+so that the measured force closes a loop of its own with the poles of (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂), all
+inside the unit circle for 0 ≤ m̂ ≤ m_o (docs/derivations.md).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.measured_force import ROD_SHARE
 from defmanip_gym.theory.dynamics.task_space import task_inertia
 from defmanip_gym.theory.payload.object_model import HangingBeam
 
@@ -126,25 +128,27 @@ class ObservedLoop:
         compliance = np.linalg.inv(M + true.apparent)
         advance, forced = _held(true, -compliance @ true.force(), self.period_s)
         if self.believed_beam is None:
-            feeds, shown, seen = M, np.zeros((_AXES, 2 * count)), np.eye(_AXES)
+            weighed = self.beam.mass_kg * np.diag((ROD_SHARE, 1.0, 1.0))
+            feeds, shown, seen = M + weighed, np.zeros((_AXES, 2 * count)), np.eye(_AXES)
         else:
             believed = HangingObject.of(self.believed_beam)
             feeds, shown = M + believed.apparent, believed.force(half)
-            seen = np.zeros((_AXES, _AXES))
+            seen = weighed = np.zeros((_AXES, _AXES))
         step = self.period_s * self.observer_gain
         under_way = max(1, self.delay_periods)
 
         def one_sample(state: Array) -> Array:
             x, (F, d, v_last, *queue) = state[:size], state[size:].reshape(-1, _AXES)
             p, v, swing = x[:_AXES], x[_AXES : 2 * _AXES], x[2 * _AXES :]
-            d = d + step * ((v - v_last) / self.period_s - queue[-1] - d)
+            gained = (v - v_last) / self.period_s
+            d = d + step * (gained - queue[-1] - d)
             following = self.following_rate * true.levers
             desired = following @ swing[:count] - self.approach_rate * p
             desired_rate = following @ swing[count:] - self.approach_rate * v
             u_o = desired_rate - self.tracking_gain * (v - desired)
             queue = [*queue[-under_way:], u_o - d]
             acting = queue[-1 - self.delay_periods]
-            held = compliance @ (feeds @ acting + shown @ swing + seen @ F)
+            held = compliance @ (feeds @ acting + shown @ swing + seen @ F - weighed @ gained)
             after = advance @ x + forced @ held
             swing = after[2 * _AXES :]
             acceleration = held - compliance @ true.force() @ swing

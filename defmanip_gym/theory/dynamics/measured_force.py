@@ -1,16 +1,23 @@
 """Joint-space control that knows no object: Eqs. (2), (3) with the grasp force as it is measured.
 
-T_r = M_r v̇_des + C_r + J_Aᵀ F gives 𝒯 = 𝓜 w + 𝓒 + F by Eq. (4). With F as last read the grasp gets
-(𝓜 + m̃_o11) ẍ_a = 𝓜 w + m̃_o11 ẍ_a[k−1]: the payload's apparent inertia is a lag of one sample,
-stable for any object (docs/derivations.md). Torques that the grasp passes on are not measured.
+    T_r = M_r v̇_des + C_r + J_Aᵀ (F + m̂ (w − ẍ_a))
+
+By Eq. (4) that is 𝒯 = 𝓜 w + 𝓒 + F + m̂ (w − ẍ_a), with F as last read and ẍ_a what the grasp had
+when it was read. The first three terms are Eq. (3) solved for 𝒯; alone they give (𝓜 + m̃_o11) ẍ_a =
+𝓜 w + m̃_o11 ẍ_a[k−1]: what the object weighs is known, but its inertia is felt one sample late. The
+last term makes up for that with the mass that the force tells, m̂ = m (I − ¾ d dᵀ) as of a uniform
+rod swung out to d: then ẍ_a − w = (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂)(ẍ_a[k−1] − w). Its poles lie within the
+unit circle for every object (docs/derivations.md). Torques passed on at the grasp are not measured.
 """
 
 from __future__ import annotations
 
+from math import cos, sin
+
 import numpy as np
 
 from defmanip_gym.compiled import compilable, compiled
-from defmanip_gym.params import RobotParams
+from defmanip_gym.params import GRAVITY_M_S2, RobotParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.feedback_linearization import FeedbackLinearization
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
@@ -19,6 +26,11 @@ from defmanip_gym.theory.dynamics.robot_model import (
     reach_and_height,
     reach_and_height_slopes,
 )
+
+# of a uniform rod's mass along the way that it swings: 1 − m_o12 m_o22⁻¹ m_o12ᵀ / m_o
+ROD_SHARE = 0.25
+# a grasp that falls cannot weigh; at least this share of g is taken for its acceleration
+_LEAST_WEIGHT = 0.5
 
 
 class MeasuredForceLinearization:
@@ -39,6 +51,8 @@ class MeasuredForceLinearization:
         joint_rates: Array,
         base_velocity: Array,
         grasp_force_b: Array,
+        acceleration_b: Array,
+        swing: Array,
     ) -> Array:
         """Return T_r = (f_b, α_b, τ1, τ2), shape (n, 4) in N and N·m.
 
@@ -48,32 +62,61 @@ class MeasuredForceLinearization:
             joint_rates: q̇_a, (n, 2) rad/s.
             base_velocity: (u1, u2), (n, 2) m/s, rad/s.
             grasp_force_b: F, the force on the object as read, (n, 3) N.
+            acceleration_b: ẍ_a of the grasp when F was read, (n, 3) m/s².
+            swing: φ of the object at the grasp, (n,) rad.
         """
         nothing = np.empty((len(w), 0))
         forces = self._alone.generalized_forces(
             w, joints, joint_rates, base_velocity, nothing, nothing
         )
-        pitch = np.cumsum(joints, axis=1)
-        force_b = np.ascontiguousarray(grasp_force_b, dtype=np.float64)
-        _add_grasp_forces(self._alone.model.arm, pitch, force_b, forces)
+        _add_grasp_forces(
+            self._alone.model.arm,
+            *(
+                np.ascontiguousarray(values, dtype=np.float64)
+                for values in (w, joints, grasp_force_b, acceleration_b, swing)
+            ),
+            forces,
+        )
         return forces
 
 
 @compilable
 def add_grasp_force_at(
-    arm: ArmLengths, upper: float, fore: float, force_b: Array, forces: Array, i: int
+    arm: ArmLengths,
+    w_forward: float,
+    w_left: float,
+    w_up: float,
+    upper: float,
+    fore: float,
+    swing: float,
+    force_b: Array,
+    acceleration_b: Array,
+    forces: Array,
+    i: int,
 ) -> None:
-    """Add J_Aᵀ F of Eq. (2) for one state to row i of ``forces``, (n, 4) N and N·m.
+    """Add J_Aᵀ (F + m̂ (w − ẍ_a)) for one state to row i of ``forces``, (n, 4) N and N·m.
 
     Args:
         arm: lengths as believed.
+        w_forward: task-space acceleration, m/s², base frame.
+        w_left: to the left.
+        w_up: and upwards.
         upper: α1, rad.
         fore: α2, rad.
-        force_b: F, (n, 3) N, of which row i counts.
+        swing: φ of the object at the grasp, rad.
+        force_b: F, (n, 3) N, of which row i counts, as below.
+        acceleration_b: ẍ_a when F was read, (n, 3) m/s².
         forces: T_r without an object, to which it is added.
         i: the row.
     """
-    forward, left, up = force_b[i, 0], force_b[i, 1], force_b[i, 2]
+    weighing = GRAVITY_M_S2 + acceleration_b[i, 2]
+    mass = max(force_b[i, 2], 0.0) / max(weighing, _LEAST_WEIGHT * GRAVITY_M_S2)
+    c, s = cos(swing), sin(swing)
+    ahead, above = w_forward - acceleration_b[i, 0], w_up - acceleration_b[i, 2]
+    along = (1.0 - ROD_SHARE) * (c * ahead + s * above)
+    forward = force_b[i, 0] + mass * (ahead - c * along)
+    left = force_b[i, 1] + mass * (w_left - acceleration_b[i, 1])
+    up = force_b[i, 2] + mass * (above - s * along)
     reach, _ = reach_and_height(arm, upper, fore)
     rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
     elbow = rho_2 * forward + z_2 * up
@@ -85,6 +128,27 @@ def add_grasp_force_at(
 
 
 @compiled
-def _add_grasp_forces(arm: ArmLengths, pitch: Array, force_b: Array, forces: Array) -> None:
+def _add_grasp_forces(
+    arm: ArmLengths,
+    w: Array,
+    joints: Array,
+    force_b: Array,
+    acceleration_b: Array,
+    swing: Array,
+    forces: Array,
+) -> None:
     for i in range(len(forces)):
-        add_grasp_force_at(arm, pitch[i, 0], pitch[i, 1], force_b, forces, i)
+        upper = joints[i, 0]
+        add_grasp_force_at(
+            arm,
+            w[i, 0],
+            w[i, 1],
+            w[i, 2],
+            upper,
+            upper + joints[i, 1],
+            swing[i],
+            force_b,
+            acceleration_b,
+            forces,
+            i,
+        )
