@@ -178,7 +178,7 @@ class TransportEngine:
         self._fill_scores(ids, *self._at_rest, before=self._scores)
         self._noise.restart(ids)
         self._noise.add(self._scores.observations, ids)
-        self._inner_loop.begin(ids, self._observed_force_b)
+        self._inner_loop.begin(ids, self._observed_force_b, self._plant.swing)
         return self._scores.observations, self.info
 
     def draw_from(self, generators: Sequence[np.random.Generator]) -> None:

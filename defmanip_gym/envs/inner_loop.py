@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import compilable, compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ActionError
+from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.feedback_linearization import (
@@ -20,7 +21,7 @@ from defmanip_gym.theory.dynamics.feedback_linearization import (
     generalized_forces_at,
 )
 from defmanip_gym.theory.dynamics.frames import turned
-from defmanip_gym.theory.dynamics.measured_force import add_grasp_force_at
+from defmanip_gym.theory.dynamics.measured_force import add_grasp_force_at, weighed_mass
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
 from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
 from defmanip_gym.validation import number_array
@@ -47,11 +48,13 @@ class FeltForce(NamedTuple):
 
     Attributes:
         force_b: on the object as last read, sensor noise included, (n, 3) N.
-        acceleration_b: mean of the grasp's over the last period, (n, 3) m/s².
+    acceleration_b: mean of the grasp's over the last period, (n, 3) m/s².
+    mass_kg: of the object, weighed at the start, (n,).
     """
 
     force_b: Array
     acceleration_b: Array
+    mass_kg: Array
 
 
 class InnerLoop:
@@ -83,7 +86,7 @@ class InnerLoop:
             arm=ArmLengths.of(config.robot),
         )
         actions = np.empty(self._shape)
-        self._felt = FeltForce(np.zeros((num_envs, 3)), np.zeros((num_envs, 3)))
+        self._felt = FeltForce(*np.zeros((2, num_envs, 3)), np.zeros(num_envs))
         segments = config.beam.segment_count
         self._state = StateRoom.empty(len(linearization.model.d_o22))
         plant = PlantState.empty(num_envs, segments)
@@ -101,9 +104,18 @@ class InnerLoop:
                 _feel, self._constants, plant, plant, np.empty((num_envs, 3)), self._felt
             )
 
-    def begin(self, ids: Ids, force_b: Array) -> None:
-        """Note the first force readings, (n, 3) N, of episodes that begin at rest."""
-        self._felt.force_b[ids], self._felt.acceleration_b[ids] = force_b[ids], 0.0
+    def begin(self, ids: Ids, force_b: Array, swing: Array) -> None:
+        """Weigh the objects of episodes that begin at rest.
+
+        Args:
+            ids: the episodes.
+            force_b: first force readings, (n, 3) N.
+            swing: φ, (n, N) rad.
+        """
+        felt, force_b = self._felt, force_b[ids]
+        felt.force_b[ids], felt.acceleration_b[ids] = force_b, 0.0
+        mass_kg = weighed_mass(force_b[:, 0], force_b[:, 2], swing[ids, 0])
+        felt.mass_kg[ids] = np.maximum(mass_kg, 0.0)
 
     def feel(self, before: PlantState, plant: PlantState, force_b: Array) -> None:
         """Note what a period brought; only the inner loop ``"measured_force"`` needs it.
@@ -119,7 +131,9 @@ class InnerLoop:
         """Return what was felt last; where it is not noted, the present force as if at rest."""
         felt = self._felt
         if not self._measures_force:
-            felt = FeltForce(plant.grasp_force_b, np.zeros_like(plant.grasp_force_b))
+            force_b = plant.grasp_force_b
+            mass_kg = np.maximum(force_b[:, 2], 0.0) / GRAVITY_M_S2
+            felt = FeltForce(force_b, np.zeros_like(force_b), mass_kg)
         return {name: values.copy() for name, values in felt._asdict().items()}
 
     def set_state(self, state: dict[str, Array]) -> None:
@@ -283,6 +297,7 @@ def _add_grasp_force(
             plant.swing[i, 0],
             felt.force_b,
             felt.acceleration_b,
+            felt.mass_kg,
             forces,
             i,
         )

@@ -21,6 +21,7 @@ from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
@@ -110,11 +111,14 @@ class ErrorSearch:
         self._moving = np.arange(count) >= len(resting.joints)
         self._place(resting, ~self._moving)
         self._place(moving, self._moving)
-        if config.inner_loop == "measured_force":  # of robots on their way it does not count yet
-            self._inner_loop.begin(np.arange(count), self._felt_force_b())
+        self._measures_force = config.inner_loop == "measured_force"
+        if self._measures_force:
+            self._feel_first()
         self._steps = rng.integers(0, np.where(self._moving, _LATEST_START, 1))
         self._under_way = deque(np.zeros((delay_periods, count, 3)))
-        self._periods, self._unknown = periods, 1 + delay_periods
+        # what a robot on its way would have felt is known after its first period only
+        self._unfelt = 1 if self._measures_force else 0
+        self._periods, self._unknown = periods, 1 + delay_periods + self._unfelt
 
     def _place(self, motions: Motions, where: BoolArray) -> None:
         ids = np.flatnonzero(where)
@@ -125,7 +129,7 @@ class ErrorSearch:
         """Step through the periods."""
         before = self._observed()
         self._filter.begin(self._memory, before, np.ones(self._count, dtype=bool))
-        for period in range(self._periods + len(self._under_way)):
+        for period in range(self._periods + len(self._under_way) + self._unfelt):
             decision = self._filter.certify_action(self._wild_commands(), before, self._memory)
             self._under_way.append(decision.allowed_m_s2)
             after, stray = self._advance(self._under_way.popleft(), before)
@@ -160,13 +164,24 @@ class ErrorSearch:
             observation = self._observed()
             now = Sensed.observed(self._layout, observation)
             velocities.append(base_to_world(now.velocity_b, now.heading - start.heading))
-        if self._config.inner_loop == "measured_force":
+        if self._measures_force:
             self._inner_loop.feel(plant, simulation.read(), self._felt_force_b())
         self._steps = self._steps + 1
         shares = np.array(times)[:, None, None] / times[-1]
         line = velocities[0] + shares * (velocities[-1] - velocities[0])
         stray = np.abs(np.array(velocities) - line)[:, :, 0].mean(axis=0)
         return observation, stray
+
+    def _feel_first(self) -> None:
+        """Let sensors read what holding the object still would take, and then what that causes."""
+        everybody, simulation = np.arange(self._count), self._simulation
+        weight = np.array([0.0, 0.0, self._config.beam.mass_kg * GRAVITY_M_S2])
+        hanging = np.zeros((self._count, 1))
+        self._inner_loop.begin(everybody, np.tile(weight, (self._count, 1)), hanging)
+        forces, plant = np.zeros_like(simulation.generalized_forces), simulation.read()
+        self._inner_loop.write_forces(np.zeros((self._count, 3)), plant, forces)
+        simulation.hold(everybody, forces)
+        self._inner_loop.feel(plant, plant, self._felt_force_b())
 
     def _felt_force_b(self) -> Array:
         """Return what the force sensor reads, (n, 3) N."""

@@ -5,8 +5,8 @@
 By Eq. (4) that is 𝒯 = 𝓜 w + 𝓒 + F + m̂ (w − ẍ_a), with F as last read and ẍ_a what the grasp had
 when it was read. The first three terms are Eq. (3) solved for 𝒯; alone they give (𝓜 + m̃_o11) ẍ_a =
 𝓜 w + m̃_o11 ẍ_a[k−1]: what the object weighs is known, but its inertia is felt one sample late. The
-last term makes up for that with the mass that the force tells, m̂ = m (I − ¾ d dᵀ) as of a uniform
-rod swung out to d: then ẍ_a − w = (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂)(ẍ_a[k−1] − w). Its poles lie within the
+last term makes up for that with the mass as it was weighed at rest, m̂ = m (I − ¾ d dᵀ) as of a
+uniform rod swung out to d: then ẍ_a − w = (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂)(ẍ_a[k−1] − w). Its poles lie within the
 unit circle for every object (docs/derivations.md). Torques passed on at the grasp are not measured.
 """
 
@@ -16,7 +16,7 @@ from math import cos, sin
 
 import numpy as np
 
-from defmanip_gym.compiled import compilable, compiled
+from defmanip_gym.compiled import Numbers, compilable, compiled
 from defmanip_gym.params import GRAVITY_M_S2, RobotParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.feedback_linearization import FeedbackLinearization
@@ -29,8 +29,15 @@ from defmanip_gym.theory.dynamics.robot_model import (
 
 # of a uniform rod's mass along the way that it swings: 1 − m_o12 m_o22⁻¹ m_o12ᵀ / m_o
 ROD_SHARE = 0.25
-# a grasp that falls cannot weigh; at least this share of g is taken for its acceleration
-_LEAST_WEIGHT = 0.5
+
+
+@compilable
+def weighed_mass(forward_n: Numbers, up_n: Numbers, swing: Numbers) -> Numbers:
+    """Return m, (...) kg, from the force on an object at rest that hangs at φ, (...).
+
+    A rod lets its grasp feel F·e = m g cos φ along itself, e = (−sin φ, cos φ), however it turns.
+    """
+    return (up_n - forward_n * np.tan(swing)) / GRAVITY_M_S2
 
 
 class MeasuredForceLinearization:
@@ -52,6 +59,7 @@ class MeasuredForceLinearization:
         base_velocity: Array,
         grasp_force_b: Array,
         acceleration_b: Array,
+        mass_kg: Array,
         swing: Array,
     ) -> Array:
         """Return T_r = (f_b, α_b, τ1, τ2), shape (n, 4) in N and N·m.
@@ -63,6 +71,7 @@ class MeasuredForceLinearization:
             base_velocity: (u1, u2), (n, 2) m/s, rad/s.
             grasp_force_b: F, the force on the object as read, (n, 3) N.
             acceleration_b: ẍ_a of the grasp when F was read, (n, 3) m/s².
+            mass_kg: m of the object as weighed, (n,).
             swing: φ of the object at the grasp, (n,) rad.
         """
         nothing = np.empty((len(w), 0))
@@ -73,7 +82,7 @@ class MeasuredForceLinearization:
             self._alone.model.arm,
             *(
                 np.ascontiguousarray(values, dtype=np.float64)
-                for values in (w, joints, grasp_force_b, acceleration_b, swing)
+                for values in (w, joints, grasp_force_b, acceleration_b, mass_kg, swing)
             ),
             forces,
         )
@@ -91,6 +100,7 @@ def add_grasp_force_at(
     swing: float,
     force_b: Array,
     acceleration_b: Array,
+    mass_kg: Array,
     forces: Array,
     i: int,
 ) -> None:
@@ -106,11 +116,11 @@ def add_grasp_force_at(
         swing: φ of the object at the grasp, rad.
         force_b: F, (n, 3) N, of which row i counts, as below.
         acceleration_b: ẍ_a when F was read, (n, 3) m/s².
+        mass_kg: m of the object as weighed, (n,).
         forces: T_r without an object, to which it is added.
         i: the row.
     """
-    weighing = GRAVITY_M_S2 + acceleration_b[i, 2]
-    mass = max(force_b[i, 2], 0.0) / max(weighing, _LEAST_WEIGHT * GRAVITY_M_S2)
+    mass = mass_kg[i]
     c, s = cos(swing), sin(swing)
     ahead, above = w_forward - acceleration_b[i, 0], w_up - acceleration_b[i, 2]
     along = (1.0 - ROD_SHARE) * (c * ahead + s * above)
@@ -134,6 +144,7 @@ def _add_grasp_forces(
     joints: Array,
     force_b: Array,
     acceleration_b: Array,
+    mass_kg: Array,
     swing: Array,
     forces: Array,
 ) -> None:
@@ -149,6 +160,7 @@ def _add_grasp_forces(
             swing[i],
             force_b,
             acceleration_b,
+            mass_kg,
             forces,
             i,
         )
