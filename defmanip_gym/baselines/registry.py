@@ -12,10 +12,10 @@ import sys
 from importlib.metadata import distributions
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast, get_args
 
 from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
 from defmanip_gym.errors import ControllerError
 from defmanip_gym.theory.certificates import Certificate
 
@@ -127,6 +127,21 @@ def identity_of(reference: str, controller: Controller) -> dict[str, Any]:
     if reference.startswith(f"{_OWN}."):
         return told  # whose version is known to records
     return told | {"source": _digest(reference.partition(":")[0].partition(".")[0])}
+
+
+def inner_loop_of(reference: str, controller: Controller) -> InnerLoopKind:
+    """Return the inner loop that a controller is made for: its attribute, if it has one.
+
+    Raises:
+        ControllerError: there is no such inner loop.
+    """
+    kinds = get_args(InnerLoopKind)
+    kind = getattr(controller, "inner_loop", kinds[0])
+    if kind not in kinds:
+        raise ControllerError(
+            f"inner_loop of {reference}", kind, f"one of {', '.join(kinds)}", "See TransportConfig."
+        )
+    return cast(InnerLoopKind, kind)
 
 
 def _digest(package: str) -> str:

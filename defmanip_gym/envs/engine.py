@@ -268,7 +268,7 @@ class TransportEngine:
         self._fill_scores(self._all, actions, failed, before=before)
         awake = self._all if idle is None else np.flatnonzero(~idle)
         self._noise.add(self._scores.observations, awake)
-        if self.config.inner_loop == "measured_force":
+        if self._inner_loop.feels:
             self._inner_loop.feel(self._plant_before, self._plant, self._observed_force_b)
         return self._scores
 

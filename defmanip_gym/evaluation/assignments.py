@@ -73,7 +73,9 @@ def _assignment(
     suite: Suite, contestant: Contestant, member: Member, folder: RecordFolder, threads: int
 ) -> Assignment:
     whole = suite_named(suite.name)
-    identity = job_fingerprint(whole, member.controller, contestant.protection)
+    identity = job_fingerprint(
+        whole, member.controller, contestant.protection, contestant.inner_loop
+    )
     entry = Entry(
         suite=suite.name,
         contestant=contestant.name,
@@ -88,6 +90,7 @@ def _assignment(
             entry=entry,
             controller=member.controller,
             protection=contestant.protection,
+            inner_loop=contestant.inner_loop,
             suite=replace(suite, scenarios=missing),
             traced=_traced(whole) if is_first else (),
             num_threads=threads,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams, DisturbanceParams
 from defmanip_gym.task_params import TaskParams
@@ -78,6 +78,10 @@ class Condition:
             nominal_beam=replace(NOMINAL_BEAM, damping=0.0),
             disturbance=self.disturbance,
         )
+
+    def environment_on(self, inner_loop: InnerLoopKind) -> TransportConfig:
+        """Return the environment with the inner loop that a contestant runs on."""
+        return replace(self.environment, inner_loop=inner_loop)
 
 
 NOMINAL = Condition(name="nominal")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.evaluation.controllers import ControllerSpec
 from defmanip_gym.evaluation.entry import Family
 from defmanip_gym.evaluation.protection import Protection
@@ -35,6 +36,7 @@ class Contestant:
         colour: of its lines in plots, ``#rrggbb``.
         members: its controllers; one unless it was trained several times.
         protection: the safety filter around the environment; None runs without one.
+        inner_loop: between the task acceleration and the forces.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Contestant:
     colour: str
     members: tuple[Member, ...]
     protection: Protection | None = None
+    inner_loop: InnerLoopKind = "model"
 
     @property
     def name_alone(self) -> str:

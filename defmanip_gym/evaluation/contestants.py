@@ -11,7 +11,7 @@ from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Random, Zero
 from defmanip_gym.evaluation.entry import SOLE_MEMBER
 from defmanip_gym.evaluation.learned_contestants import family_contestant
-from defmanip_gym.evaluation.options import CERTIFICATES, FILTER_OPTION, OPTIONS
+from defmanip_gym.evaluation.options import CERTIFICATES, FILTER_OPTION, OPTIONS, OTHER_INNER_LOOP
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 from defmanip_gym.validation import require_choice
@@ -47,8 +47,9 @@ def known_names() -> tuple[str, ...]:
 
     Any ``module:factory`` can be, too, alone or inside a filter.
     """
-    bases = (*registered_controllers(), *shipped_families())
-    every = (f"{base}/{option}" for base in bases for option in OPTIONS)
+    families = shipped_families()
+    bases = (*registered_controllers(), *families, *(f + OTHER_INNER_LOOP for f in families))
+    every = (name for base in bases for name in (base, *(f"{base}/{o}" for o in OPTIONS)))
     return tuple(dict.fromkeys((*standard_names(), *every)))
 
 
@@ -89,7 +90,7 @@ def _contestant(name: str, certificates: Certificates, member_limit: int | None)
     registered = registered_controllers()
     if base in registered:
         return controller_contestant(base, registered[base], method, certificates)
-    return family_contestant(base, method, certificates, member_limit)
+    return family_contestant(name, certificates, member_limit)
 
 
 _REFERENCES = {

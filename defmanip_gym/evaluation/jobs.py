@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.evaluation.controllers import ControllerSpec
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.protection import Protection
@@ -21,6 +22,7 @@ class Job:
         entry: names the results.
         controller: how to make the controller.
         protection: around the environment, or None.
+        inner_loop: of the environment.
         suite: with those scenarios that have no record yet.
         traced: names of the scenarios whose time course is wanted.
         num_threads: physics threads, 0 for one per CPU.
@@ -29,6 +31,7 @@ class Job:
     entry: Entry
     controller: ControllerSpec
     protection: Protection | None
+    inner_loop: InnerLoopKind
     suite: Suite
     traced: tuple[str, ...]
     num_threads: int
@@ -52,7 +55,7 @@ def run_job(job: Job) -> JobResult:
             job.entry,
             job.controller.build([scenario.seed for scenario in scenarios]),
             scenarios,
-            config=condition.environment,
+            config=condition.environment_on(job.inner_loop),
             horizon_s=job.suite.horizon_s,
             safety_filter=None if protection is None else protection.filter_for(condition),
             delay_periods=condition.delay_periods,
@@ -62,19 +65,27 @@ def run_job(job: Job) -> JobResult:
     return JobResult(job=job, episodes=tuple(episodes))
 
 
-def job_fingerprint(suite: Suite, controller: ControllerSpec, protection: Protection | None) -> str:
+def job_fingerprint(
+    suite: Suite,
+    controller: ControllerSpec,
+    protection: Protection | None,
+    inner_loop: InnerLoopKind = "model",
+) -> str:
     """Identify whatever the records of a job depend on.
 
     Args:
         suite: the whole of it, also where only the first scenarios are run.
         controller: of the job.
         protection: of the job.
+        inner_loop: of the job.
     """
     return fingerprint(
         {
             "package_version": __version__,
             "horizon_s": suite.horizon_s,
-            "environments": [asdict(condition.environment) for condition in suite.conditions],
+            "environments": [
+                asdict(condition.environment_on(inner_loop)) for condition in suite.conditions
+            ],
             "scenarios": suite.digest,
             "controller": controller.identity,
             "certificate": None if protection is None else protection.identity,

@@ -5,18 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import is_sb3_zip, load_agent, load_family
 from defmanip_gym.baselines.learned.card import AgentCard
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
+from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation.colours import GUEST_COLOURS, contestant_colour
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
 from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Learned, Sb3Zip
 from defmanip_gym.evaluation.entry import SOLE_MEMBER
-from defmanip_gym.evaluation.options import CERTIFICATES, FILTER_OPTION, inside, known_inside
+from defmanip_gym.evaluation.options import (
+    CERTIFICATES,
+    FILTER_OPTION,
+    INNER_LOOP_MARK,
+    inside,
+    known_below,
+    known_inside,
+)
 from defmanip_gym.evaluation.protection import (
     Certificates,
     StorageProtection,
@@ -29,24 +38,34 @@ _OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance"})  # en
 
 
 def family_contestant(
-    family: str, method: str, certificates: Certificates, member_limit: int | None
+    name: str, certificates: Certificates, member_limit: int | None
 ) -> Contestant:
-    """Return a shipped family, alone or inside a filter.
+    """Return a shipped family, alone or inside a filter, on either inner loop.
 
     Args:
-        family: its name.
-        method: names the filter; empty for none.
+        name: family, family@inner_loop, and either of them with /filter.
         certificates: where certificates come from.
         member_limit: how many members take part, lowest seeds first; all by default.
 
     Raises:
         AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
+    base, _, method = name.partition("/")
+    family, _, inner_loop = base.partition(INNER_LOOP_MARK)
     actors = load_family(family)[:member_limit]
     about = f"Agents of the shipped family {family}, trained with {len(actors)} seeds"
-    name = f"{family}/{method}" if method else family
-    colour = contestant_colour(family, method)
-    return _learned(name, actors, method, about, colour, certificates)
+    colour = contestant_colour(base, method)
+    contestant = _learned(name, actors, method, about, colour, certificates)
+    if not inner_loop:
+        return contestant
+    kind = cast(InnerLoopKind, inner_loop)
+    return replace(
+        contestant,
+        description=f"{contestant.description[:-1]}, on the inner loop {kind!r}.",
+        privileged="; ".join((contestant.privileged, *known_below(kind))),
+        protection=protection_named(method, certificates, kind),
+        inner_loop=kind,
+    )
 
 
 def agent_contestants(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.params import DESIGN_DAMPING
 from defmanip_gym.theory.filters.family import REFERENCE_FILTERS, STORAGE_FILTERS
 
@@ -9,6 +10,9 @@ from defmanip_gym.theory.filters.family import REFERENCE_FILTERS, STORAGE_FILTER
 FILTER_OPTION = "storage"
 CERTIFICATES = ("phase_plane", "l1", "tanner")
 OPTIONS = (*STORAGE_FILTERS, *REFERENCE_FILTERS, *CERTIFICATES)
+# before the slash: an inner loop that a contestant was not made for
+INNER_LOOP_MARK = "@"
+OTHER_INNER_LOOP = f"{INNER_LOOP_MARK}measured_force"
 
 _INSIDE = {
     "": "",
@@ -27,6 +31,11 @@ _FILTER_KNOWS = f"{_CERTIFICATE_KNOWS}, how far others may differ, and noise and
 def inside(method: str) -> str:
     """Return what an option adds to a contestant's description; nothing without one."""
     return f", {_INSIDE[method]}" if method else ""
+
+
+def known_below(inner_loop: InnerLoopKind) -> tuple[str, ...]:
+    """Return what the inner loop knows, if it is not the environment's own."""
+    return ("the inner loop feels the grasp force",) if inner_loop == "measured_force" else ()
 
 
 def known_inside(method: str) -> tuple[str, ...]:

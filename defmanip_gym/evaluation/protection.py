@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol
 
+from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.params import DESIGN_DAMPING, BeamRanges
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
@@ -20,6 +21,8 @@ from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
 
 # factors on the nominal beam that are provided for where a condition carries another
 MISMATCH_FACTORS = {"damping": (0.1, 10.0), "mass_kg": (0.8, 1.2), "length_m": (0.8, 1.2)}
+# and where the inner loop takes no weight for granted; on the other one errors would leave nothing
+MEASURED_FACTORS = MISMATCH_FACTORS | {"mass_kg": (0.5, 2.0)}
 
 
 class Protection(Protocol):
@@ -68,34 +71,50 @@ class CertificateProtection:
 
 @dataclass(frozen=True)
 class StorageProtection:
-    """A filter of the storage's kind, for the nominal beam."""
+    """A filter of the storage's kind, for the nominal beam.
+
+    Attributes:
+        method: by which it is named.
+        inner_loop: of the environment, whose errors it has room for.
+    """
 
     method: str
+    inner_loop: InnerLoopKind = "model"
     certificate: None = None
+
+    @property
+    def factors(self) -> dict[str, tuple[float, float]]:
+        """What it provides for where a condition carries another beam than the nominal one."""
+        return MISMATCH_FACTORS if self.inner_loop == "model" else MEASURED_FACTORS
 
     @property
     def identity(self) -> dict[str, Any]:
         """What it enforces and for what, as JSON values."""
-        return {"filter": self.method, "beam": asdict(NOMINAL_BEAM), "mismatch": MISMATCH_FACTORS}
+        return {
+            "filter": self.method,
+            "beam": asdict(NOMINAL_BEAM),
+            "mismatch": self.factors,
+            "inner_loop": self.inner_loop,
+        }
 
     def filter_for(self, condition: Condition) -> SafetyFilter:
         """Return the filter for the environments of a condition."""
-        return _storage_filter(self.method, condition)
+        return _storage_filter(self, condition)
 
 
 @lru_cache(maxsize=64)
-def _storage_filter(method: str, condition: Condition) -> SafetyFilter:
+def _storage_filter(protection: StorageProtection, condition: Condition) -> SafetyFilter:
     """Return a filter that knows a condition's noise and delay, and of its beam the intervals."""
-    config = condition.environment
+    config = condition.environment_on(protection.inner_loop)
     if condition.beam != NOMINAL_BEAM:
         ranges = {
-            name: tuple(factor * getattr(NOMINAL_BEAM, name) for factor in factors)
-            for name, factors in MISMATCH_FACTORS.items()
+            name: tuple(factor * getattr(NOMINAL_BEAM, name) for factor in ends)
+            for name, ends in protection.factors.items()
         }
         config = replace(config, beam=NOMINAL_BEAM, beam_ranges=BeamRanges(**ranges))
     return filter_for(
         config,
-        kind=(STORAGE_FILTERS | REFERENCE_FILTERS)[method],
+        kind=(STORAGE_FILTERS | REFERENCE_FILTERS)[protection.method],
         beam=NOMINAL_BEAM,
         delay_periods=condition.delay_periods,
     )
@@ -117,10 +136,12 @@ class Certificates:
         return self._made[method]
 
 
-def protection_named(method: str, certificates: Certificates) -> Protection | None:
+def protection_named(
+    method: str, certificates: Certificates, inner_loop: InnerLoopKind = "model"
+) -> Protection | None:
     """Return a filter by its name, None for an empty one."""
     if not method:
         return None
     if method in STORAGE_FILTERS | REFERENCE_FILTERS:
-        return StorageProtection(method)
+        return StorageProtection(method, inner_loop)
     return CertificateProtection(certificates.named(method))

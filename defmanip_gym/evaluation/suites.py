@@ -1,4 +1,4 @@
-"""The evaluation's scenarios: five named suites, frozen, with seeds that nothing else uses."""
+"""The evaluation's scenarios: six named suites, frozen, with seeds that nothing else uses."""
 
 from __future__ import annotations
 
@@ -99,6 +99,8 @@ _MISMATCH = (
 )
 # 5 rad/s is where the beam swings by itself; 2 N is a fifteenth of its weight
 _OSCILLATION = {"force_amplitude_n": 2.0, "force_frequency_rad_s": 5.0}
+# from half of what everybody believes to twice as much
+_PAYLOAD = _conditions("mass_factor", 0.5, 0.7, 1.5, 2.0)
 _DISTURBED = (
     Condition(name="force-oscillation", disturbance=DisturbanceParams(**_OSCILLATION)),
     Condition(name="force-bias", disturbance=DisturbanceParams(force_bias_n=2.0)),
@@ -194,6 +196,11 @@ SUITES = (
         description="Starts 12 to 18 m from the goal, at any bearing with any heading, where no "
         "agent was trained.",
         scenarios=_scenarios(4, [NOMINAL], _FAR_COUNT, _far_start),
+    ),
+    Suite(
+        name="payload",
+        description="Beams of half to twice the mass that everybody believes.",
+        scenarios=_scenarios(5, _PAYLOAD, 8, _trained_start),
     ),
 )
 SUITE_NAMES = tuple(suite.name for suite in SUITES)

@@ -24,7 +24,7 @@ _WARM_UP, _SAMPLES = 20, 300
 def decision_time_s(contestant: Contestant) -> float:
     """Return the median wall time of ``predict`` on a batch of one, safety filter included, s."""
     condition = Condition(name="nominal")
-    config = condition.environment
+    config = condition.environment_on(contestant.inner_loop)
     env = DeformTransportEnv(constraint_mode="cost", nominal_beam=config.nominal_beam)
     observation = env.reset(seed=0)[0][None]
     env.close()

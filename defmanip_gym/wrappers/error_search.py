@@ -111,13 +111,12 @@ class ErrorSearch:
         self._moving = np.arange(count) >= len(resting.joints)
         self._place(resting, ~self._moving)
         self._place(moving, self._moving)
-        self._measures_force = config.inner_loop == "measured_force"
-        if self._measures_force:
+        if self._inner_loop.feels:
             self._feel_first()
         self._steps = rng.integers(0, np.where(self._moving, _LATEST_START, 1))
         self._under_way = deque(np.zeros((delay_periods, count, 3)))
         # what a robot on its way would have felt is known after its first period only
-        self._unfelt = 1 if self._measures_force else 0
+        self._unfelt = 1 if self._inner_loop.feels else 0
         self._periods, self._unknown = periods, 1 + delay_periods + self._unfelt
 
     def _place(self, motions: Motions, where: BoolArray) -> None:
@@ -148,9 +147,7 @@ class ErrorSearch:
         task, simulation = self._config.task, self._simulation
         plant = simulation.read()
         self._inner_loop.write_forces(
-            command / task.max_acceleration_m_s2,
-            plant,
-            simulation.generalized_forces,
+            command / task.max_acceleration_m_s2, plant, simulation.generalized_forces
         )
         if self._config.disturbance.has_force:
             simulation.push_grasp(disturbing_force(self._config, self._steps))
@@ -164,8 +161,9 @@ class ErrorSearch:
             observation = self._observed()
             now = Sensed.observed(self._layout, observation)
             velocities.append(base_to_world(now.velocity_b, now.heading - start.heading))
-        if self._measures_force:
-            self._inner_loop.feel(plant, simulation.read(), self._felt_force_b())
+        if self._inner_loop.feels:
+            later = simulation.read()
+            self._inner_loop.feel(plant, later, self._as_read(later.grasp_force_b))
         self._steps = self._steps + 1
         shares = np.array(times)[:, None, None] / times[-1]
         line = velocities[0] + shares * (velocities[-1] - velocities[0])
@@ -175,17 +173,16 @@ class ErrorSearch:
     def _feel_first(self) -> None:
         """Let sensors read what holding the object still would take, and then what that causes."""
         everybody, simulation = np.arange(self._count), self._simulation
-        weight = np.array([0.0, 0.0, self._config.beam.mass_kg * GRAVITY_M_S2])
-        hanging = np.zeros((self._count, 1))
-        self._inner_loop.begin(everybody, np.tile(weight, (self._count, 1)), hanging)
+        weight = np.zeros((self._count, 3))
+        weight[:, 2] = self._config.beam.mass_kg * GRAVITY_M_S2
+        self._inner_loop.begin(everybody, self._as_read(weight), np.zeros((self._count, 1)))
         forces, plant = np.zeros_like(simulation.generalized_forces), simulation.read()
         self._inner_loop.write_forces(np.zeros((self._count, 3)), plant, forces)
         simulation.hold(everybody, forces)
-        self._inner_loop.feel(plant, plant, self._felt_force_b())
+        self._inner_loop.feel(plant, plant, self._as_read(simulation.read().grasp_force_b))
 
-    def _felt_force_b(self) -> Array:
-        """Return what the force sensor reads, (n, 3) N."""
-        force_b = self._simulation.read().grasp_force_b
+    def _as_read(self, force_b: Array) -> Array:
+        """Return forces, (n, 3) N, as the noisy sensor reads them."""
         noise_n = self._config.disturbance.force_sensor_noise_n
         return force_b + noise_n * self._rng.standard_normal(force_b.shape)
 

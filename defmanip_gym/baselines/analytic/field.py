@@ -145,8 +145,12 @@ class FieldController:
     @property
     def identity(self) -> dict[str, Any]:
         """What its behaviour depends on, as JSON values."""
-        parts = {"params": self.params, "beam": self.beam, "robot": self.robot, "task": self.task}
-        return {name: asdict(part) for name, part in parts.items()}
+        return {
+            "params": asdict(self.params),
+            "beam": asdict(self.beam),
+            "robot": asdict(self.robot),
+            "task": asdict(self.task),
+        }
 
     def predict(
         self,

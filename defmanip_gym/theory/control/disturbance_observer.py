@@ -104,5 +104,4 @@ def weight_disturbance(robot: RobotParams, beam: BeamParams, pitch: Array, force
     shown[:, 2, 2] += force_b[:, 2] / GRAVITY_M_S2
     missing = np.zeros_like(force_b)
     missing[:, 2] = beam.mass_kg * GRAVITY_M_S2 - force_b[:, 2]
-    disturbance: Array = np.linalg.solve(shown, missing[..., None])[..., 0]
-    return disturbance
+    return np.asarray(np.linalg.solve(shown, missing[..., None])[..., 0], dtype=np.float64)

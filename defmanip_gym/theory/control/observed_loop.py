@@ -8,7 +8,7 @@ dampers and weight do to the grasp, (𝓜 + m̃_o11) ẍ_a + b = 𝒯 − 𝓒 f
                                       F[k] = m̃_o11 ẍ_a[k−] + b[k]
 
 so that the measured force closes a loop of its own with the poles of (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂), all
-inside the unit circle for 0 ≤ m̂ ≤ m_o (docs/derivations.md).
+of them 0 for a uniform rod (docs/derivations.md).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class HangingObject:
         return cls(
             coupling=partition.m_o12,
             apparent=model.apparent_inertia(partition),
-            follows=np.linalg.solve(partition.m_o22, partition.m_o12.T),
+            follows=np.asarray(np.linalg.solve(partition.m_o22, partition.m_o12.T), np.float64),
             stiffness=model.k_o22 + gravity,
             damping=model.d_o22,
             inertia=partition.m_o22,

@@ -1,8 +1,8 @@
 """Swing following: the grasp goes where the object has swung to, which takes energy from it.
 
-With x_c the object's centre of mass forward of the grasp, ż_1 = κ x_c means z̈_1 = κ ẋ_c, and in
-Lemma III.1's V̇ = −ż2ᵀ d_o22 ż2 − ż2ᵀ m_o12ᵀ z̈_1, where m_o12ᵀ's forward row times ż2 is m_o ẋ_c, that
-adds −κ m_o ẋ_c²: damping from the object's geometry alone, whatever its mass and damping are.
+With x_c the object's centre of mass forward of the grasp, ż_1 = κ x_c means z̈_1 = κ ẋ_c. The
+forward row of m_o12 times ż2 is m_o ẋ_c: in Lemma III.1's V̇ = −ż2ᵀ d_o22 ż2 − ż2ᵀ m_o12ᵀ z̈_1
+this adds −κ m_o ẋ_c²: damping from the object's shape alone, whatever its mass and damping are.
 """
 
 from __future__ import annotations

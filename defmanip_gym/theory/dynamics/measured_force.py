@@ -6,8 +6,9 @@ By Eq. (4) that is 𝒯 = 𝓜 w + 𝓒 + F + m̂ (w − ẍ_a), with F as last 
 when it was read. The first three terms are Eq. (3) solved for 𝒯; alone they give (𝓜 + m̃_o11) ẍ_a =
 𝓜 w + m̃_o11 ẍ_a[k−1]: what the object weighs is known, but its inertia is felt one sample late. The
 last term makes up for that with the mass as it was weighed at rest, m̂ = m (I − ¾ d dᵀ) as of a
-uniform rod swung out to d: then ẍ_a − w = (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂)(ẍ_a[k−1] − w). Its poles lie within the
-unit circle for every object (docs/derivations.md). Torques passed on at the grasp are not measured.
+uniform rod swung out to d: then ẍ_a − w = (𝓜 + m̃_o11)⁻¹ (m̃_o11 − m̂)(ẍ_a[k−1] − w), which is 0 for
+rods and dies out for every object with m̂ < 𝓜 + 2 m̃_o11 (docs/derivations.md). Torques that the
+grasp passes on are not measured.
 """
 
 from __future__ import annotations
@@ -80,10 +81,12 @@ class MeasuredForceLinearization:
         )
         _add_grasp_forces(
             self._alone.model.arm,
-            *(
-                np.ascontiguousarray(values, dtype=np.float64)
-                for values in (w, joints, grasp_force_b, acceleration_b, mass_kg, swing)
-            ),
+            np.ascontiguousarray(w),
+            np.ascontiguousarray(joints),
+            np.ascontiguousarray(grasp_force_b),
+            np.ascontiguousarray(acceleration_b),
+            np.ascontiguousarray(mass_kg),
+            np.ascontiguousarray(swing),
             forces,
         )
         return forces
