@@ -9,7 +9,8 @@ Reading order, beside the paper (docs/paper_map.md has every equation):
 =================  ================================================================================
 II.A, IV.B         ``dynamics``: ``chain``, ``robot_model`` (1), (2), (7); ``frames``;
                    ``task_space`` (3), (4), (8), (28); ``redundancy``,
-                   ``pseudoinverse_resolution`` IV.B; ``feedback_linearization`` (28)
+                   ``pseudoinverse_resolution`` IV.B; ``feedback_linearization`` (28);
+                   ``measured_force``: (2) with the grasp force in the place of a model
 II.B, III          ``payload``: ``object_model`` (5), (6), (10), (11); ``elastic_beam``;
                    ``passivity`` Lemma III.1; ``zero_dynamics`` (12)–(16); ``controllability``
 III                ``certificates``: ``low_gain`` (24)–(26); ``iss_gain`` (17), (21);
@@ -28,6 +29,7 @@ III, beyond        ``filters``: ``storage``, Lemma III.1's V as a barrier; ``saf
                    ``viability_bounds``: what is possible at all, ``viability_share``
 IV.A, V            ``control``: ``velocity_field`` IV.A; ``control_laws`` (20), (27), (29);
                    ``continuous_loop`` (30)–(34); ``stability``, ``effective_damping``: what
-                   sampling and wrong parameters make of it
+                   sampling and wrong parameters make of it; ``disturbance_observer``,
+                   ``swing_following``, ``observed_loop``: the same without a model
 =================  ================================================================================
 """

@@ -38,6 +38,7 @@ ARGUMENTS = [
         "constraint_mode": "cost",
     },
     {"disturbance": DisturbanceParams(force_bias_n=0.5, swing_sensor_noise_rad=0.01)},
+    {"inner_loop": "measured_force", "beam": BeamParams(mass_kg=5.0)},
     {"beam_ranges": BeamRanges(length_m=np.array([0.5, 0.7]))},
 ]
 

@@ -35,6 +35,7 @@ ARGUMENTS = {
     "three segments": {"beam": BeamParams(segment_count=3, damping=0.1)},
     "drawn beams": {"beam_ranges": BeamRanges(damping=(0.05, 1.0), mass_kg=(0.5, 2.0))},
     "noise": {"disturbance": NOISY},
+    "felt force": {"inner_loop": "measured_force", "disturbance": NOISY},
     "soon violated": {"sigma_rad": 0.06},
 }
 MODES = ("NextStep", "SameStep", "Disabled")

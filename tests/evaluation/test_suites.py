@@ -20,6 +20,7 @@ DIGESTS = {
     "mismatch": "fcf231d8a2e52673",
     "disturbed": "2bb008ba6614ff92",
     "far": "59c6dcb644616571",
+    "payload": "586d7edb3f3e4902",
 }
 
 
@@ -49,8 +50,10 @@ def test_no_seed_is_used_twice_or_in_training():
 
 def test_sizes_and_conditions():
     count = {suite.name: len(suite.scenarios) for suite in SUITES}
-    assert count == {"nominal": 64, "paper": 2, "mismatch": 64, "disturbed": 56, "far": 48}
-    for name in ("mismatch", "disturbed"):
+    assert count == {
+        "nominal": 64, "paper": 2, "mismatch": 64, "disturbed": 56, "far": 48, "payload": 32
+    }  # fmt: skip
+    for name in ("mismatch", "disturbed", "payload"):
         suite = suite_named(name)
         assert {len(suite.of(condition)) for condition in suite.conditions} == {8}
 

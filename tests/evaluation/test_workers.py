@@ -100,4 +100,4 @@ def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_p
     process = start(there, 2)
     _, errors = process.communicate(timeout=300)
     assert (process.returncode, errors) == (0, "")
-    assert files(there) == files(here) and len(files(here)) == 10
+    assert files(there) == files(here) and len(files(here)) == 12
