@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.theory.filters.storage_filter import StorageFilter, StorageMemory
+from defmanip_gym.theory.filters.storage_keeping import StorageKeeping, StorageMemory
 from defmanip_gym.wrappers.filter_errors import filter_errors
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ class StorageTerms:
         safety_filter: that is enforced.
     """
 
-    def __init__(self, config: TransportConfig, safety_filter: StorageFilter) -> None:
+    def __init__(self, config: TransportConfig, safety_filter: StorageKeeping) -> None:
         self._config, self._filter = config, safety_filter
         self.method = safety_filter.name
         self.delay_periods = safety_filter.conditions.delay_periods
