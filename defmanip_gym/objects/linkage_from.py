@@ -112,7 +112,7 @@ def _require_likeness(object_file: ObjectFile, forces: InternalForces, linkage: 
     """Refuse an object that the links do not move and pull as MuJoCo does."""
     rng, nothing = np.random.default_rng(0), np.zeros(1)
     z2 = linkage.rest + _DEFLECTION * rng.uniform(-1, 1, (_STATES, forces.count))
-    model = LinkageModel(linkage, nothing, nothing, nothing, np.ones(1), nothing)
+    model = LinkageModel(linkage, nothing, nothing, nothing, np.ones(1), nothing, nothing)
     seen, inner = look(model, z2), slice(CARRIAGE, None)
     rows = [0, 1, 2, YAW]
     for i, configuration in enumerate(z2):

@@ -9,6 +9,7 @@ with z2 as ``swing``; goal, force and what else filters do not look at stay zero
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.object_rig import ObjectRig
@@ -34,6 +35,7 @@ class RigRobot:
         self._steps = max(round(limits.period_s / rig.timestep_s), 1)
         self.layout = ObservationLayout(self._segments)
         self._state = Sensed.empty(self._count, self._segments)
+        self._halted = np.zeros(self._count, dtype=bool)
         self.peak = np.zeros((self._count, self._segments))
 
     def place(
@@ -52,6 +54,8 @@ class RigRobot:
         state = self._state
         state.pitch[:] = require_array("pitch", pitch, (n, 2))
         state.pitch_rate[:] = 0.0
+        self._halted[:] = False
+        self._pitch_at_start = state.pitch.copy()
         self.rig.place(
             require_array("z2", z2, (n, N)), require_array("z2_rate", z2_rate, (n, N))
         )
@@ -73,9 +77,24 @@ class RigRobot:
         # wheels do not slip: at the period's end the yaw rate is what the leftward speed asks for
         later = self._state.velocity_b[:, 1] / self._reach()
         motions[:, 3] = (later - self.rig.yaw_rate) / self._limits.period_s
+        motions[self._halted] = 0.0
         self.peak = self.rig.push(motions, steps=self._steps)
         self._read()
         return self.observation()
+
+    def halt(self, where: NDArray[np.bool_]) -> None:
+        """Let robots stand still from now on, (n,), whatever is commanded."""
+        self._halted |= where
+        velocity, yaw_rate = self.rig.grasp_velocity_w, self.rig.yaw_rate
+        velocity[self._halted], yaw_rate[self._halted] = 0.0, 0.0
+        self.rig.move(velocity, yaw_rate)
+        self._state.pitch[self._halted] = self._pitch_at_start[self._halted]
+        self._state.pitch_rate[self._halted] = 0.0
+
+    @property
+    def pitch(self) -> Array:
+        """α of the arms, (n, 2) rad."""
+        return self._state.pitch.copy()
 
     def observation(self) -> Array:
         """Return what is observed, (n, size)."""

@@ -116,9 +116,14 @@ class ObjectRig:
         """Where MuJoCo has given up on a simulation, (n,)."""
         return self._sentinel.diverged
 
-    def move(self, velocity_b: Array, yaw_rate: Array) -> None:
-        """Let grasps move and turn, (n, 3) m/s and (n,) rad/s, that have no yaw yet."""
-        self._velocity[:, :3], self._velocity[:, self._yaw] = velocity_b, yaw_rate
+    @property
+    def grasp_velocity_w(self) -> Array:
+        """The same in world axes, (n, 3) m/s."""
+        return self._velocity[:, :3].copy()
+
+    def move(self, velocity_w: Array, yaw_rate: Array) -> None:
+        """Let grasps move and turn from now on, (n, 3) m/s in world axes and (n,) rad/s."""
+        self._velocity[:, :3], self._velocity[:, self._yaw] = velocity_w, yaw_rate
 
     def push(self, accelerations: Array, *, steps: int) -> Array:
         """Hold accelerations for some steps; return max |z2| on the way, (n, N).

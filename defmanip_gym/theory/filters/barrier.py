@@ -151,6 +151,15 @@ def excess_after(
 
 
 @compilable
+def reach_rate_of(limits: RobotLimits, sensed: Sensed, i: int) -> float:
+    """Return ρ̇ of state i, m/s."""
+    upper, fore, _, _ = reach_and_height_slopes(
+        limits.arm, sensed.pitch[i, 0], sensed.pitch[i, 1]
+    )
+    return upper * sensed.pitch_rate[i, 0] + fore * sensed.pitch_rate[i, 1]
+
+
+@compilable
 def speed_excess(limit: float, forward: float, left: float, up: float) -> float:
     """Return by how much a velocity is faster than a limit, m/s."""
     return max(sqrt(forward**2 + left**2 + up**2) - limit, 0.0)
@@ -164,9 +173,7 @@ def coasting(
 
     A base that is pushed backwards turns away by itself; holding its yaw rate slows the grasp.
     """
-    arm = setup.limits.arm
-    rho_1, rho_2, _, _ = reach_and_height_slopes(arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
-    reach_rate = rho_1 * sensed.pitch_rate[i, 0] + rho_2 * sensed.pitch_rate[i, 1]
+    reach_rate = reach_rate_of(setup.limits, sensed, i)
     pushed = min(sensed.base_velocity[i, 0] + 2.0 * reach_rate, 0.0)
     turning = sensed.base_velocity[i, 1] * pushed
     return -beside[0], turning - beside[1], -beside[2]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from defmanip_gym.compiled import chosen_by_type, compilable
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.linkage_storage import (
     LinkageModel,
     LinkageStorageRoom,
     linkage_power,
+    linkage_reversing,
     linkage_step,
     linkage_storage,
 )
@@ -57,8 +60,19 @@ def _certain(
     return 0.0
 
 
+@compilable
+def _may_reverse(
+    model: StorageModel, ahead: float, yaw_rate: float, reach: float, period_s: float
+) -> tuple[float, float, float]:
+    """Return no limits: rods do not feel what is leftward."""
+    return -np.inf, -np.inf, np.inf
+
+
 step_carried = chosen_by_type({StorageModel: _rod_step, LinkageModel: linkage_step})
 stored_in_carried = chosen_by_type({StorageModel: storage_at, LinkageModel: linkage_storage})
 power_of_carried = chosen_by_type({StorageModel: _rod_power, LinkageModel: linkage_power})
+reversing_with_carried = chosen_by_type(
+    {StorageModel: _may_reverse, LinkageModel: linkage_reversing}
+)
 uncertain_in_carried = chosen_by_type({StorageModel: uncertain_storage, LinkageModel: _certain})
 

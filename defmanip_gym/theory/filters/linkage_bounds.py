@@ -100,7 +100,7 @@ def bounded(linkage: Linkage, mass_kg: float, sigma_rad: float) -> tuple[Linkage
         CertificateError: it does not hang within σ, or its energy does not rise towards it.
     """
     zero = np.zeros(1)
-    model = LinkageModel(linkage, zero, zero, zero, np.array([mass_kg]), zero)
+    model = LinkageModel(linkage, zero, zero, zero, np.array([mass_kg]), zero, np.full(1, np.inf))
     equilibrium = _equilibrium(model, sigma_rad)
     model = model._replace(lowest=look(model, equilibrium[None]).potential)
     coordinate, pass_j = _lowest_pass(model, equilibrium, sigma_rad)

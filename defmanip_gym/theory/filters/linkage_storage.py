@@ -31,6 +31,7 @@ class LinkageModel(NamedTuple):
         yaw_momentum: μ, (1,) kg·m²/s.
         mass: of all that is carried, (1,) kg.
         passes: V_σ, (1,) J.
+        reversing: |u1 + 2ρ̇| |u2| that a robot may have while reversing, (1,) m/s².
     """
 
     linkage: Linkage
@@ -39,6 +40,7 @@ class LinkageModel(NamedTuple):
     yaw_momentum: Array
     mass: Array
     passes: Array
+    reversing: Array
 
 
 class LinkageStorageRoom(NamedTuple):
@@ -152,6 +154,32 @@ def linkage_power(
     if yaw_rate < 0.0:
         turning -= model.yaw_momentum[0]
     return forward, left - turning / reach, upward
+
+
+@compilable
+def linkage_reversing(
+    model: LinkageModel, ahead: float, yaw_rate: float, reach: float, period_s: float
+) -> tuple[float, float, float]:
+    """Return the least acceleration forward, and the range to the side, m/s², while reversing.
+
+    A robot that reverses jackknifes: to hold its yaw rate it has to accelerate to the side by
+    |u1 + 2ρ̇| |u2|, which feeds what swings there, so only little of that is let happen.
+
+    Args:
+        model: of the object.
+        ahead: u1 + 2ρ̇, m/s.
+        yaw_rate: u2, rad/s.
+        reach: ρ, m.
+        period_s: for which accelerations hold.
+    """
+    free, turning = model.reversing[0], abs(yaw_rate)
+    if free == np.inf:
+        return -np.inf, -np.inf, np.inf
+    back = min((-free / max(turning, 1e-9) - ahead) / period_s, 0.0)
+    holding, largest = ahead * yaw_rate, free / max(-ahead, 1e-9)
+    low = min(reach * (-largest - yaw_rate) / period_s, 0.0)
+    high = max(reach * (largest - yaw_rate) / period_s, 0.0)
+    return back, holding + low, holding + high
 
 
 @compilable

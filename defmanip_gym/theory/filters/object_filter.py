@@ -12,11 +12,13 @@ from defmanip_gym.errors import CertificateError
 from defmanip_gym.params import GRAVITY_M_S2, RobotParams, validated_sigma
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.dynamics.robot_model import reach_and_height_slopes
 from defmanip_gym.theory.filters.conditions import LARGEST_ERROR, FilterConditions
 from defmanip_gym.theory.filters.linkage_bounds import bounded
 from defmanip_gym.theory.filters.linkage_storage import LinkageStorageRoom
-from defmanip_gym.theory.filters.safety_filter import FilterProof
-from defmanip_gym.theory.filters.storage_keeping import StorageKeeping
+from defmanip_gym.theory.filters.safety_filter import BoolArray, FilterProof
+from defmanip_gym.theory.filters.sensed import Sensed
+from defmanip_gym.theory.filters.storage_keeping import StorageKeeping, StorageMemory
 from defmanip_gym.theory.payload.linkage import Linkage, require_linkage
 from defmanip_gym.validation import (
     plain,
@@ -26,6 +28,8 @@ from defmanip_gym.validation import (
     settle,
 )
 
+_NEGLIGIBLE = 1e-6
+
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectConditions(FilterConditions):
@@ -33,13 +37,17 @@ class ObjectConditions(FilterConditions):
 
     Attributes:
         lateral_offset_m_s2: how far the offset to the side may be from zero: objects feel it.
+        reversing_m_s2: |u1 + 2ρ̇| |u2| that a robot may have while reversing, with an object that
+            swings to the side.
     """
 
     lateral_offset_m_s2: float = 0.2
+    reversing_m_s2: float = 0.3
 
     def __post_init__(self) -> None:
         super().__post_init__()
         settle(self, "lateral_offset_m_s2", require_number, 0.0, LARGEST_ERROR, "m/s²")
+        settle(self, "reversing_m_s2", require_positive, "m/s²")
         if self.swing_noise_rad:
             raise CertificateError(
                 "swing_noise_rad",
@@ -97,7 +105,16 @@ class ObjectStorageFilter(StorageKeeping):
         self._object, self._bounds = bounded(self.linkage, self.mass_kg, self.sigma_rad)
         self.equilibrium, self.coordinate = self._bounds.equilibrium, self._bounds.coordinate
         momentum = np.array([np.linalg.norm(self._bounds.momenta)])
+        if self._feels_the_side:
+            free = np.array([self.conditions.reversing_m_s2])
+            self._object = self._object._replace(reversing=free)
         self._prepare(self._object, momentum, LinkageStorageRoom.empty(self.segment_count))
+
+    @property
+    def _feels_the_side(self) -> bool:
+        _, left, _ = self._bounds.momenta
+        felt = max(left, float(self._object.yaw_momentum[0]))
+        return bool(felt > _NEGLIGIBLE * self._bounds.momenta.max())
 
     @property
     def specification(self) -> dict[str, Any]:
@@ -114,6 +131,18 @@ class ObjectStorageFilter(StorageKeeping):
             conditions.vertical_offset_m_s2,
         )
 
+    def inside(self, observation: Array, memory: StorageMemory) -> BoolArray:
+        """Whether coordinates are within σ, B below its level, and it does not jackknife, (n,)."""
+        sensed = Sensed.observed(self._layout, observation)
+        slopes = reach_and_height_slopes(self.setup.limits.arm, *sensed.pitch.T)
+        ahead = sensed.velocity_b[:, 0]
+        for slope, rate in zip(slopes[:2], sensed.pitch_rate.T, strict=True):
+            ahead = ahead + slope * rate
+        turning = np.maximum(-ahead, 0.0) * np.abs(sensed.base_velocity[:, 1])
+        free = float(self._object.reversing[0])
+        within: BoolArray = super().inside(observation, memory) & (turning <= free)
+        return within
+
     def covers(self, carried: object) -> bool:
         """Whether it holds for this object: a ``Linkage`` with the same numbers."""
         return isinstance(carried, Linkage) and all(
@@ -126,6 +155,8 @@ class ObjectStorageFilter(StorageKeeping):
         momenta, pass_j = self._bounds.momenta, self.pass_j
         per_period = period_s * float(momenta @ np.array(self.errors_m_s2))
         offsets = period_s * float(momenta @ np.array(self.offsets_m_s2))
+        if self._feels_the_side:
+            offsets += period_s * float(momenta[1]) * conditions.reversing_m_s2
         at_the_limit = 2 * (offsets + per_period)
         swinging_rad = self._bounds.slowest_rad_s * period_s
         ripple = conditions.storage_error * pass_j / swinging_rad
