@@ -38,9 +38,7 @@ def object_file(folder: Path, seed: int) -> tuple[Path, str]:
         return Path(str(HOSE)), name
     body = EXAMPLES[name].format(grasp=GRASP) if name in EXAMPLES else _chain(rng)
     path = folder / f"{name}-{seed}.xml"
-    path.write_text(
-        f"<mujoco><compiler angle='radian'/><worldbody>{body}</worldbody></mujoco>"
-    )
+    path.write_text(f"<mujoco><compiler angle='radian'/><worldbody>{body}</worldbody></mujoco>")
     return path, name
 
 

@@ -100,7 +100,9 @@ def chosen_by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[...
     def implementation(first: Any, *others: Any) -> Callable[..., Any] | None:
         return functions.get(getattr(first, "instance_class", type(None)))
 
-    numba.extending.overload(chosen, jit_options=_CALLEE, strict=False)(implementation)
+    numba.extending.overload(chosen, jit_options=_CALLEE, strict=False)(  # type: ignore[arg-type]
+        implementation
+    )
     return chosen
 
 

@@ -127,7 +127,7 @@ def _require_likeness(object_file: ObjectFile, forces: InternalForces, linkage: 
                 raise ObjectFileError(
                     "object",
                     str(object_file.path),
-                    "bodies on hinges and slides, with springs in joints and in tendons over joints",
+                    "bodies on hinges and slides, springs in joints and in tendons over joints",
                     f"As such it has another {name}: replace what else acts in it, such as tendons "
                     "through sites, or body gravcomp.",
                 )

@@ -16,6 +16,7 @@ from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 from defmanip_gym.theory.filters.object_filter import ObjectConditions, ObjectStorageFilter
+from defmanip_gym.theory.filters.safety_filter import BoolArray
 
 _STATES, _ROUNDS = 2048, 4
 _TENTH, _SPARE = 1.1, 1.05
@@ -90,7 +91,7 @@ def storage_error_on_rig(thing: MjcfObject, made: ObjectStorageFilter, *, seed: 
 
 def storing(
     made: ObjectStorageFilter, shares: Array, yaw_rate: Array, rng: np.random.Generator
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, BoolArray]:
     """Return z2, ż2 (n, N) that store shares of the level at yaw rates (n,), and where they do."""
     n, N = len(shares), made.segment_count
     ways, rates = rng.normal(size=(2, n, N))
@@ -105,5 +106,5 @@ def storing(
     z2 = made.equilibrium + low[:, None] * ways
     still, moving = made.shares_of(z2, rest, yaw_rate), made.shares_of(z2, rates, yaw_rate)
     factor = np.sqrt(np.maximum(shares - still, 0.0) / np.maximum(moving - still, 1e-300))
-    found: Array = still <= shares
+    found: BoolArray = still <= shares
     return z2, factor[:, None] * rates, found

@@ -56,9 +56,7 @@ class RigRobot:
         state.pitch_rate[:] = 0.0
         self._halted[:] = False
         self._pitch_at_start = state.pitch.copy()
-        self.rig.place(
-            require_array("z2", z2, (n, N)), require_array("z2_rate", z2_rate, (n, N))
-        )
+        self.rig.place(require_array("z2", z2, (n, N)), require_array("z2_rate", z2_rate, (n, N)))
         velocity = np.zeros((n, 3))
         if velocity_b is not None:
             velocity[:, :2] = require_array("velocity_b", velocity_b, (n, 2))
@@ -114,7 +112,9 @@ class RigRobot:
         state, rates = self._state, self._state.pitch_rate
         state.velocity_b[:], state.heading[:] = self.rig.grasp_velocity_b, self.rig.yaw
         upper, fore, _, _ = reach_and_height_slopes(self._limits.arm, *state.pitch.T)
-        state.base_velocity[:, 0] = state.velocity_b[:, 0] - upper * rates[:, 0] - fore * rates[:, 1]
+        state.base_velocity[:, 0] = (
+            state.velocity_b[:, 0] - upper * rates[:, 0] - fore * rates[:, 1]
+        )
         state.base_velocity[:, 1] = self.rig.yaw_rate
 
     def _reach(self) -> Array:

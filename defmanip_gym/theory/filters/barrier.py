@@ -153,9 +153,7 @@ def excess_after(
 @compilable
 def reach_rate_of(limits: RobotLimits, sensed: Sensed, i: int) -> float:
     """Return ρ̇ of state i, m/s."""
-    upper, fore, _, _ = reach_and_height_slopes(
-        limits.arm, sensed.pitch[i, 0], sensed.pitch[i, 1]
-    )
+    upper, fore, _, _ = reach_and_height_slopes(limits.arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
     return upper * sensed.pitch_rate[i, 0] + fore * sensed.pitch_rate[i, 1]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
 
 from defmanip_gym.compiled import chosen_by_type, compilable
@@ -23,8 +25,9 @@ from defmanip_gym.theory.filters.storage import (
     uncertain_storage,
 )
 
-CarriedModel = StorageModel | LinkageModel
-CarriedRoom = StorageRoom | LinkageStorageRoom
+# StorageModel or LinkageModel, and its room: where code is compiled, it is known which
+CarriedModel: TypeAlias = Any
+CarriedRoom: TypeAlias = Any
 
 
 @compilable
@@ -75,4 +78,3 @@ reversing_with_carried = chosen_by_type(
     {StorageModel: _may_reverse, LinkageModel: linkage_reversing}
 )
 uncertain_in_carried = chosen_by_type({StorageModel: uncertain_storage, LinkageModel: _certain})
-

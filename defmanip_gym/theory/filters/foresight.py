@@ -65,7 +65,7 @@ def advance_robot(
     sensed: Sensed,
     i: int,
 ) -> tuple[tuple[float, float, float], float, float]:
-    """Move robot and grasp of a state on by a period, in place; return what that does to its object.
+    """Move robot and grasp of a state on by a period; return what that does to its object.
 
     Args:
         limits: of the robot.

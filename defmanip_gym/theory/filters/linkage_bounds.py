@@ -93,7 +93,9 @@ def look(model: LinkageModel, z2: Array) -> Seen:
     return seen
 
 
-def bounded(linkage: Linkage, mass_kg: float, sigma_rad: float) -> tuple[LinkageModel, LinkageBounds]:
+def bounded(
+    linkage: Linkage, mass_kg: float, sigma_rad: float
+) -> tuple[LinkageModel, LinkageBounds]:
     """Return the model of an object within σ, and what was found of it.
 
     Raises:

@@ -5,7 +5,8 @@ Where z2 swings out of the vertical plane of the heading, turning couples to it 
     B = V + ½ u2² (I_σ − I_z) + μ |u2|,    μ ≥ |m_yᵀ ż2| wherever V ≤ V_σ,
     Ḃ = −ż2ᵀ d_o22 ż2 − sᵀ z̈1 + u̇2 (u2 (I_σ − I_z) + μ sign u2 − m_yᵀ ż2),
 
-so that B rises neither with the grasp at rest nor while |u2| falls. Docs/derivations.md, section 18.
+so that B does not rise while the grasp does not accelerate and |u2| does not grow.
+Derivation: docs/derivations.md, section 18.
 """
 
 from __future__ import annotations
@@ -57,9 +58,15 @@ class LinkageStorageRoom(NamedTuple):
     @classmethod
     def empty(cls, count: int) -> LinkageStorageRoom:
         """Return room for N links."""
-        numbers = (np.zeros(count) for _ in range(4))
-        matrix = np.zeros((count, count))
-        return cls(*numbers, matrix, LinkageRoom.empty(count), MotionRoom.empty(count))
+        return cls(
+            swing=np.zeros(count),
+            swing_rate=np.zeros(count),
+            middle=np.zeros(count),
+            rate=np.zeros(count),
+            matrix=np.zeros((count, count)),
+            links=LinkageRoom.empty(count),
+            motion=MotionRoom.empty(count),
+        )
 
 
 @compilable

@@ -150,7 +150,7 @@ class ObjectStorageFilter(StorageKeeping):
         )
 
     def _reserved_shares(self) -> Array:
-        """Return the share of V_σ that errors and delay cost, (1,): as of rods, in any direction."""
+        """Return the share of V_σ that errors and delay cost, (1,), as of rods."""
         conditions, period_s = self.conditions, self.task.control_period_s
         momenta, pass_j = self._bounds.momenta, self.pass_j
         per_period = period_s * float(momenta @ np.array(self.errors_m_s2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -113,4 +113,3 @@ class StorageFilter(StorageKeeping):
         inertia = float(self._beams.inertia[0, 0] + self._beams.coupling[0, 0, 0])
         kept = potential <= level
         return swing[kept], np.sqrt(2 * (level - potential[kept]) / inertia)
-

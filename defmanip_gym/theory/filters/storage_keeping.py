@@ -66,8 +66,7 @@ class StorageKeeping(SafetyFilter):
     """A filter that keeps a storage B below a level under V_σ.
 
     Members say what is carried: its model, and what errors cost of V_σ. Observations are those of
-    ``ObservationLayout(N)``: of an object, ``swing`` is z2 and ``swing_rate`` ż2, in the order and the
-    units of its coordinates.
+    ``ObservationLayout(N)``.
 
     Attributes:
         conditions: errors, noise and delay that it makes room for.

@@ -71,7 +71,9 @@ def require_linkage(name: str, value: Any) -> Linkage:
     for field, given in fields.items():
         array, shape = number_array(given), shapes.get(field, (n,))
         if array is None or array.shape != shape or not np.isfinite(array).all() or n == 0:
-            raise ParameterError(f"{name}.{field}", given, f"finite numbers {shape}", "See Linkage.")
+            raise ParameterError(
+                f"{name}.{field}", given, f"finite numbers {shape}", "See Linkage."
+            )
         arrays[field] = np.array(array, dtype=np.float64)
     parents, slides = arrays.pop("parent").astype(np.int64), arrays.pop("slides").astype(np.int64)
     if (parents >= np.arange(n)).any() or (parents < -1).any():

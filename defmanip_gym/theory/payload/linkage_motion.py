@@ -155,7 +155,11 @@ def push(
             spare[2, 2] += GRAVITY_M_S2
         else:
             for k in range(3):
-                spare[0, k], spare[1, k], spare[2, k] = spin[parent, k], spin_dot[parent, k], a[parent, k]
+                spare[0, k], spare[1, k], spare[2, k] = (
+                    spin[parent, k],
+                    spin_dot[parent, k],
+                    a[parent, k],
+                )
                 r[k] -= links.origin[parent, k]
         for k in range(3):
             inner[k] = cross(spare[0], r, k)
