@@ -22,6 +22,7 @@ from defmanip_gym.theory.filters.storage_keeping import StorageKeeping, StorageM
 from defmanip_gym.theory.payload.linkage import Linkage, require_linkage
 from defmanip_gym.validation import (
     plain,
+    require_between,
     require_number,
     require_params,
     require_positive,
@@ -37,17 +38,17 @@ class ObjectConditions(FilterConditions):
 
     Attributes:
         lateral_offset_m_s2: how far the offset to the side may be from zero: objects feel it.
-        reversing_m_s2: |u1 + 2ρ̇| |u2| that a robot may have while reversing, with an object that
-            swings to the side.
+        reversing_share: of V_σ, what turning while reversing may bring in half a swing to the side;
+            |u1 + 2ρ̇| |u2| is kept that small.
     """
 
     lateral_offset_m_s2: float = 0.2
-    reversing_m_s2: float = 0.3
+    reversing_share: float = 0.08
 
     def __post_init__(self) -> None:
         super().__post_init__()
         settle(self, "lateral_offset_m_s2", require_number, 0.0, LARGEST_ERROR, "m/s²")
-        settle(self, "reversing_m_s2", require_positive, "m/s²")
+        settle(self, "reversing_share", require_between, 0.0, 1.0)
         if self.swing_noise_rad:
             raise CertificateError(
                 "swing_noise_rad",
@@ -106,8 +107,7 @@ class ObjectStorageFilter(StorageKeeping):
         self.equilibrium, self.coordinate = self._bounds.equilibrium, self._bounds.coordinate
         momentum = np.array([np.linalg.norm(self._bounds.momenta)])
         if self._feels_the_side:
-            free = np.array([self.conditions.reversing_m_s2])
-            self._object = self._object._replace(reversing=free)
+            self._object = self._object._replace(reversing=self._free_while_reversing())
         self._prepare(self._object, momentum, LinkageStorageRoom.empty(self.segment_count))
 
     @property
@@ -130,6 +130,12 @@ class ObjectStorageFilter(StorageKeeping):
             conditions.lateral_offset_m_s2,
             conditions.vertical_offset_m_s2,
         )
+
+    def _free_while_reversing(self) -> Array:
+        """Return |u1 + 2ρ̇| |u2|, (1,) m/s², that in half a swing stores no more than its share."""
+        slowest, sideways = self._bounds.slowest_rad_s, max(self._bounds.momenta[1], 1e-12)
+        left_j = self.conditions.reversing_share * float(self._object.passes[0])
+        return np.array([left_j * slowest / (2 * sideways)])
 
     def inside(self, observation: Array, memory: StorageMemory) -> BoolArray:
         """Whether coordinates are within σ, B below its level, and it does not jackknife, (n,)."""
@@ -155,8 +161,6 @@ class ObjectStorageFilter(StorageKeeping):
         momenta, pass_j = self._bounds.momenta, self.pass_j
         per_period = period_s * float(momenta @ np.array(self.errors_m_s2))
         offsets = period_s * float(momenta @ np.array(self.offsets_m_s2))
-        if self._feels_the_side:
-            offsets += period_s * float(momenta[1]) * conditions.reversing_m_s2
         at_the_limit = 2 * (offsets + per_period)
         swinging_rad = self._bounds.slowest_rad_s * period_s
         ripple = conditions.storage_error * pass_j / swinging_rad
@@ -167,7 +171,8 @@ class ObjectStorageFilter(StorageKeeping):
         pull = GRAVITY_M_S2 * math.sin(self.sigma_rad) + largest
         moving = float(self.linkage.mass.sum())
         between = period_s**2 / 8 * moving * pull * math.sqrt(3.0) * largest
-        return np.array([(at_the_limit + ripple + delayed + between) / pass_j])
+        share = (at_the_limit + ripple + delayed + between) / pass_j
+        return np.array([share + conditions.reversing_share * self._feels_the_side])
 
 
 def plain_linkage(linkage: Linkage) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from defmanip_gym.validation import number_array
 
 BoolArray = NDArray[np.bool_]
 
-# for which model of the object invariance is proven; "nominal": that a filter rolls out, or that has
-# the bounds which its search found
+# for which model of the object invariance is proven; "nominal": that a filter rolls out, or that
+# has the bounds which its search found
 FilterProof = Literal["nonlinear", "nominal", "linear", "none"]
 
 
