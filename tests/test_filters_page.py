@@ -31,9 +31,11 @@ def test_without_the_filter_the_same_commands_exceed_sigma_as_soon_as_told(capsy
     assert float(capsys.readouterr().out) < 0
 
 
-def test_the_script_for_objects_keeps_sigma_of_the_hose(capsys):
-    exec(compile(OBJECTS, "filters.md", "exec"), {})
-    assert capsys.readouterr().out == "True\n" and "It prints `True`." in PAGE
+def test_the_script_for_objects_keeps_sigma_of_the_hose_and_without_filter_not(capsys):
+    unfiltered = OBJECTS.replace("robot.step(decision.allowed_m_s2", "robot.step(wished")
+    for script in (OBJECTS, unfiltered):
+        exec(compile(script, "filters.md", "exec"), {})
+    assert capsys.readouterr().out == "True\nFalse\n" and "It prints `True`" in PAGE
 
 
 def test_every_member_of_the_family_has_its_row():
