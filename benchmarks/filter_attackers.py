@@ -18,11 +18,22 @@ class Attackers:
         layout: of the observations.
         count: episodes.
         rng: draws kinds, holding times and commands.
+        names: of the kinds; by default those against beams.
+        see: what they look at in observations.
     """
 
-    def __init__(self, layout: ObservationLayout, count: int, rng: Rng) -> None:
+    def __init__(
+        self,
+        layout: ObservationLayout,
+        count: int,
+        rng: Rng,
+        *,
+        names: tuple[str, ...] | None = None,
+        see: Callable[[ObservationLayout, np.ndarray], Seen] | None = None,
+    ) -> None:
         self._layout, self._count, self._rng = layout, count, rng
-        self.kinds = rng.integers(len(KINDS), size=count)
+        self._names, self._see = names or tuple(KINDS), see or Seen
+        self.kinds = rng.integers(len(self._names), size=count)
         self._holding = rng.integers(1, 16, size=count)  # control periods
         self._held = rng.choice((-1.0, 1.0), (count, 3))
 
@@ -31,11 +42,11 @@ class Attackers:
         changing = step % self._holding == 0
         fresh = self._rng.choice((-1.0, 1.0), (self._count, 3))
         self._held = np.where(changing[:, None], fresh, self._held)
-        seen = Seen(self._layout, observation)
+        seen = self._see(self._layout, observation)
         actions = np.empty((self._count, 3))
-        for index, attack in enumerate(KINDS.values()):
+        for index, name in enumerate(self._names):
             rows = self.kinds == index
-            actions[rows] = attack(seen, self._held, step)[rows]
+            actions[rows] = ATTACKS[name](seen, self._held, step)[rows]
         return actions
 
 
@@ -49,6 +60,8 @@ class Seen:
         weights = np.arange(swing.shape[1], 0, -1) - 0.5
         self.forward = sign((weights * np.cos(swing) * rate).sum(axis=1))
         self.upward = sign((weights * np.sin(swing) * rate).sum(axis=1))
+        self.leftward = sign(swing[:, 0])  # beams do not feel it
+        self.twisting = self.leftward
         self.tip = sign(rate[:, -1])
         self.velocity = layout.part(observation, "grasp_velocity_b")
         self.yaw_rate = layout.part(observation, "base_velocity")[:, 1]
@@ -112,7 +125,37 @@ def against_braking(seen: Seen, held: np.ndarray, step: int) -> np.ndarray:
     return np.stack((-seen.forward, sign(seen.velocity[:, 1]), sign(seen.velocity[:, 2])), axis=1)
 
 
-KINDS: dict[str, Callable[[Seen, np.ndarray, int], np.ndarray]] = {
+def whirling(seen: Seen, held: np.ndarray, step: int) -> np.ndarray:
+    """Push with the swing in all directions."""
+    return np.stack((-seen.forward, -seen.leftward, -seen.upward), axis=1)
+
+
+def sideways(seen: Seen, held: np.ndarray, step: int) -> np.ndarray:
+    """Push to the side with the swing, hold corners otherwise."""
+    return np.stack((held[:, 0], -seen.leftward, held[:, 2]), axis=1)
+
+
+def twisting(seen: Seen, held: np.ndarray, step: int) -> np.ndarray:
+    """Turn such that the yaw acceleration feeds the swing, push with it forwards."""
+    return np.stack((-seen.forward, seen.twisting, held[:, 2]), axis=1)
+
+
+def circling(seen: Seen, held: np.ndarray, step: int) -> np.ndarray:
+    """Drive in circles at the speed limit, half of them backwards, and push with the swing."""
+    ahead = sign(held[:, 2]) if step < 40 else sign(seen.velocity[:, 0])
+    fast = np.linalg.norm(seen.velocity, axis=1) > 1.8
+    aside = np.where(fast & (step % 3 == 0), -seen.leftward, sign(seen.yaw_rate))
+    return np.stack((np.where(fast, -seen.forward, ahead), aside, 0 * ahead), axis=1)
+
+
+def reversing(seen: Seen, held: np.ndarray, step: int) -> np.ndarray:
+    """Drive backwards, where the robot jackknifes, pushing to the side with the swing."""
+    slow = seen.velocity[:, 0] > -1.7
+    return np.stack((np.where(slow, -1.0, -seen.forward), -seen.leftward, -seen.upward), axis=1)
+
+
+_Attack = Callable[[Seen, np.ndarray, int], np.ndarray]
+KINDS: dict[str, _Attack] = {
     attack.__name__: attack
     for attack in (
         resonant,
@@ -126,4 +169,8 @@ KINDS: dict[str, Callable[[Seen, np.ndarray, int], np.ndarray]] = {
         into_the_arm,
         against_braking,
     )
+}
+# what objects that swing in any direction feel besides
+ATTACKS: dict[str, _Attack] = KINDS | {
+    attack.__name__: attack for attack in (whirling, sideways, twisting, circling, reversing)
 }

@@ -17,7 +17,7 @@ import hashlib
 import logging
 import os
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec, TypeAlias, TypeVar
@@ -86,6 +86,24 @@ def compilable(function: Callable[Parameters, Result]) -> Callable[Parameters, R
     """
     marked: Callable[Parameters, Result] = numba.extending.register_jitable(**_CALLEE)(function)
     return marked
+
+
+def chosen_by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[..., Any]:
+    """Return a function that is one of several ``compilable`` ones, by its first argument's type.
+
+    The type is that of a named tuple. Compiled code has no other than the one it was compiled for.
+    """
+
+    def chosen(first: Any, *others: Any) -> Any:
+        return functions[type(first)](first, *others)
+
+    def implementation(first: Any, *others: Any) -> Callable[..., Any] | None:
+        return functions.get(getattr(first, "instance_class", type(None)))
+
+    numba.extending.overload(chosen, jit_options=_CALLEE, strict=False)(  # type: ignore[arg-type]
+        implementation
+    )
+    return chosen
 
 
 def machine_code(

@@ -29,6 +29,9 @@ class ObservationField:
 class ObservationLayout:
     """Order of the observation of a beam with ``segment_count`` segments.
 
+    Of an object from a file, ``segment_count`` is the number N of its coordinates, ``swing`` z2 and
+    ``swing_rate`` ż2: the file's joint positions in their order, rad or m, wherever they swing.
+
     ``_b`` marks components in the base frame: forward, left, up.
     """
 

@@ -5,13 +5,20 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
 
 import defmanip_gym
-from defmanip_gym.compiled import compiled, compiled_sources, sources_stamp
+from defmanip_gym.compiled import (
+    chosen_by_type,
+    compilable,
+    compiled,
+    compiled_sources,
+    sources_stamp,
+)
 from defmanip_gym.plant.plant_state import read_state
 
 EPISODE = """
@@ -220,3 +227,30 @@ assert "defmanip_gym.compiler" not in sys.modules
 """
     found = numbers("task", another, NUMBA_CACHE_DIR=str(tmp_path))
     assert np.array_equal(found, numbers("task"))
+
+
+class One(NamedTuple):
+    value: float
+
+
+class Two(NamedTuple):
+    value: float
+
+
+def test_a_function_is_chosen_by_type_in_compiled_code_and_in_python():
+    @compilable
+    def double(each, factor):
+        return 2.0 * factor * each.value
+
+    @compilable
+    def square(each, factor):
+        return factor * each.value**2
+
+    chosen = chosen_by_type({One: double, Two: square})
+
+    @compiled
+    def both(one, two):
+        return chosen(one, 1.0), chosen(two, 1.0)
+
+    expected = (chosen(One(3.0), 1.0), chosen(Two(3.0), 1.0))
+    assert both(One(3.0), Two(3.0)) == expected == (6.0, 9.0)

@@ -14,7 +14,7 @@ from defmanip_gym.wrappers.safety_filter import SafetyFilterWrapper
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "filters.md").read_text()
-(SCRIPT,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+SCRIPT, OBJECTS = re.findall(r"```python\n(.*?)```", PAGE, re.S)
 
 
 def test_the_script_keeps_sigma_against_what_feeds_the_swing(capsys):
@@ -29,6 +29,13 @@ def test_without_the_filter_the_same_commands_exceed_sigma_as_soon_as_told(capsy
     bare = bare.replace("max_episode_steps=500", "max_episode_steps=100")  # two seconds
     exec(compile(bare, "filters.md", "exec"), {})
     assert float(capsys.readouterr().out) < 0
+
+
+def test_the_script_for_objects_keeps_sigma_of_the_hose_and_without_filter_not(capsys):
+    unfiltered = OBJECTS.replace("robot.step(decision.allowed_m_s2", "robot.step(wished")
+    for script in (OBJECTS, unfiltered):
+        exec(compile(script, "filters.md", "exec"), {})
+    assert capsys.readouterr().out == "True\nFalse\n" and "It prints `True`" in PAGE
 
 
 def test_every_member_of_the_family_has_its_row():

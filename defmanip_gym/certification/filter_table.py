@@ -42,8 +42,8 @@ def filter_remarks(ladder: Ladder) -> list[str]:
         f"{'every coordinate' if ladder.beam is None else 'every segment'} within σ, damped or not."
     )
     told.append(
-        "Of an object from a file V_σ is the lowest pass that a search found, which proves "
-        "nothing; no environment carries one yet."
+        "Of an object from a file V_σ is the lowest pass that a search found: the promise is one "
+        "for that; no environment carries such an object yet."
         if ladder.beam is None
         else "The level leaves room for the default robot's errors; "
         "filter_for(env.unwrapped.config) makes it for another."

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from defmanip_gym.certification.config import CertifyConfig
-from defmanip_gym.errors import CertificateError, ParameterError
+from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError
 from defmanip_gym.objects.mjcf_object import MjcfObject
-from defmanip_gym.objects.object_storage import ObjectStorage
 from defmanip_gym.theory.certificates.conditions import CertificateConditions
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.conditions import PayloadIntervals
 from defmanip_gym.theory.filters.family import STORAGE_FILTERS
+from defmanip_gym.theory.filters.object_filter import ObjectStorageFilter
 from defmanip_gym.theory.filters.safety_filter import FilterProof
 from defmanip_gym.theory.filters.storage import lowest_pass
-from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.theory.filters.storage_keeping import StorageKeeping
 
 # stored energy over the level, of z2, ż2 and the yaw rate
 Share = Callable[[Array, Array, float], float]
@@ -94,23 +94,22 @@ def file_lines(
 ) -> tuple[FilterLine, ...]:
     """Return the line of the storage filter for an object from a file."""
     try:
-        made = ObjectStorage(thing, sigma_rad=config.sigma)
-    except CertificateError as error:
-        return (_refused(StorageFilter.name, str(error)),)
-
-    def share(z2: Array, rate: Array, yaw_rate: float) -> float:
-        return made.stored(z2, rate, yaw_rate).energy_j / made.level_j
+        made = ObjectStorageFilter(
+            thing.linkage(), mass_kg=thing.object_file.mass_kg, sigma_rad=config.sigma
+        )
+    except (CertificateError, ObjectFileError) as error:
+        return (_refused(ObjectStorageFilter.name, str(error)),)
 
     return (
         FilterLine(
-            name=StorageFilter.name,
+            name=made.name,
             pass_j=made.pass_j,
-            coordinate=made.coordinate,
-            level_share=made.level_j / made.pass_j,
-            proof="none",  # the pass is the lowest that a search found
-            largest_m_s2=0.0,
+            coordinate=thing.linear.coordinates[made.coordinate],
+            level_share=made.level_share,
+            proof=made.proof,
+            largest_m_s2=made.task.max_acceleration_m_s2,
             edge=None,
-            admits=_admits(share, conditions, thing.linear.equilibrium),
+            admits=_admits(_share_of(made), conditions, made.equilibrium),
             refusal="",
         ),
     )
@@ -130,7 +129,7 @@ def _refused(name: str, refusal: str) -> FilterLine:
     )
 
 
-def _share_of(made: StorageFilter) -> Share:
+def _share_of(made: StorageKeeping) -> Share:
     def share(z2: Array, rate: Array, yaw_rate: float) -> float:
         return float(made.shares_of(z2[None], rate[None], np.array([yaw_rate]))[0])
 

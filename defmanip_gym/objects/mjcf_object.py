@@ -15,10 +15,12 @@ import numpy as np
 
 from defmanip_gym.errors import ObjectFileError
 from defmanip_gym.objects.internal_forces import CARRIAGE, YAW, InternalForces
+from defmanip_gym.objects.linkage_from import linkage_from
 from defmanip_gym.params import LARGEST_SIGMA_RAD
 from defmanip_gym.plant.object_file import ObjectFile, read_object_file
 from defmanip_gym.plant.rig_model import RigModel
 from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.theory.payload.linkage import Linkage
 from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 _FORWARD, _LEFT, _UP = range(3)
@@ -66,6 +68,14 @@ class MjcfObject:
 
     object_file: ObjectFile
     linear: LinearizedObject
+
+    def linkage(self) -> Linkage:
+        """Return the object as links, of which ``ObjectStorageFilter`` makes a filter.
+
+        Raises:
+            ObjectFileError: it has springs that links do not, such as tendons through sites.
+        """
+        return linkage_from(self.object_file)
 
     def rig(self, *, timestep_s: float = 0.002) -> RigModel:
         """Return the rig that holds the object; z2 are its joint positions."""

@@ -93,6 +93,52 @@ class ObjectRig:
         self._batch.forward()
         return acceleration[:, _CARRIAGE:] @ self.rig.read_out.T
 
+    @property
+    def grasp_velocity_b(self) -> Array:
+        """Of the grasp, (n, 3) m/s: forward, left, up."""
+        yaw, velocity = self._position[:, self._yaw], self._velocity[:, :3]
+        forward = np.cos(yaw) * velocity[:, 0] + np.sin(yaw) * velocity[:, 1]
+        left = np.cos(yaw) * velocity[:, 1] - np.sin(yaw) * velocity[:, 0]
+        return np.stack((forward, left, velocity[:, 2]), axis=1)
+
+    @property
+    def yaw(self) -> Array:
+        """θ of the grasp, (n,) rad."""
+        return self._position[:, self._yaw].copy()
+
+    @property
+    def yaw_rate(self) -> Array:
+        """u2, (n,) rad/s."""
+        return self._velocity[:, self._yaw].copy()
+
+    @property
+    def diverged(self) -> NDArray[np.bool_]:
+        """Where MuJoCo has given up on a simulation, (n,)."""
+        return self._sentinel.diverged
+
+    @property
+    def grasp_velocity_w(self) -> Array:
+        """The same in world axes, (n, 3) m/s."""
+        return self._velocity[:, :3].copy()
+
+    def move(self, velocity_w: Array, yaw_rate: Array) -> None:
+        """Let grasps move and turn from now on, (n, 3) m/s in world axes and (n,) rad/s."""
+        self._velocity[:, :3], self._velocity[:, self._yaw] = velocity_w, yaw_rate
+
+    def push(self, accelerations: Array, *, steps: int) -> Array:
+        """Hold accelerations for some steps; return max |z2| on the way, (n, N).
+
+        Args:
+            accelerations: of the grasp in its yawing frame, m/s², and of the yaw, rad/s², (n, 4).
+            steps: physics steps.
+        """
+        self._control[:] = accelerations
+        peak = np.abs(self.z2)
+        for _ in range(steps):
+            self._batch.step(nstep=1)
+            np.maximum(peak, np.abs(self.z2), out=peak)
+        return peak
+
     def shake(
         self, command: Command, *, duration_s: float, hold_steps: int = 1, record: bool = False
     ) -> Shaking:

@@ -12,7 +12,8 @@ II.A, IV.B         ``dynamics``: ``chain``, ``robot_model`` (1), (2), (7); ``fra
                    ``pseudoinverse_resolution`` IV.B; ``feedback_linearization`` (28);
                    ``measured_force``: (2) with the grasp force in the place of a model
 II.B, III          ``payload``: ``object_model`` (5), (6), (10), (11); ``elastic_beam``;
-                   ``passivity`` Lemma III.1; ``zero_dynamics`` (12)–(16); ``controllability``
+                   ``passivity`` Lemma III.1; ``zero_dynamics`` (12)–(16); ``controllability``;
+                   ``linkage``, ``linkage_motion``: (6) of links on any joints
 III                ``certificates``: ``low_gain`` (24)–(26); ``iss_gain`` (17), (21);
                    ``acceleration_budget`` (19), (31); ``ladder``, ``certificate``,
                    ``conditions``: the ladder of bounds, built of ``peak_bounds`` (18),
@@ -20,9 +21,11 @@ III                ``certificates``: ``low_gain`` (24)–(26); ``iss_gain`` (17)
                    ``phase_plane``, ``nonlinear_margin``; ``certified_command`` Remark IV.1;
                    ``error_budget``, what sampling costs of it
 III, beyond        ``filters``: ``storage``, Lemma III.1's V as a barrier; ``safety_filter``,
-                   ``conditions``, ``storage_filter``: the family and its closed form, built of
+                   ``conditions``, ``storage_keeping``, ``storage_filter``: the family and its
+                   closed form, built of ``carried``,
                    ``sensed``, ``period_mean``, ``limits``, ``barrier``, ``decision``,
                    ``foresight``, ``batches``, ``swing_estimate``, ``reserves``;
+                   ``object_filter``, of ``linkage_storage``, ``linkage_bounds``: any object;
                    ``nu_max_filter``; ``backup``, ``backup_decision``,
                    ``backup_filter``: rollouts of the nominal model; ``qp_filter``,
                    ``barrier_rows``: the literature's; ``family``; ``viability``,

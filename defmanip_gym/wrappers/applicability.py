@@ -10,20 +10,15 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
-from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.theory.filters.storage_keeping import StorageKeeping
 from defmanip_gym.wrappers.nu_max_terms import NuMaxTerms
+from defmanip_gym.wrappers.promise import Promise
 from defmanip_gym.wrappers.storage_terms import StorageTerms
 from defmanip_gym.wrappers.terms import Terms
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def require_fit(config: TransportConfig, safety_filter: SafetyFilter) -> None:
@@ -58,7 +53,7 @@ def require_fit(config: TransportConfig, safety_filter: SafetyFilter) -> None:
         )
 
 
-class Applicability:
+class Applicability(Promise):
     """Judges n episodes of an environment.
 
     Args:
@@ -67,13 +62,7 @@ class Applicability:
         count: n.
         action_changers: names of wrappers that may change the allowed actions.
         delay_periods: control periods until an action takes effect.
-
-    Attributes:
-        reasons: why the filter's promise does not cover the episodes, in words, (n,); empty where
-            it does as far as is known by now.
     """
-
-    remembers = ("words", "_is_outside")  # of which the rest follows
 
     def __init__(
         self,
@@ -83,74 +72,9 @@ class Applicability:
         action_changers: tuple[str, ...] = (),
         delay_periods: int = 0,
     ) -> None:
-        self._config, self._filter = config, safety_filter
+        super().__init__(safety_filter, _terms(config, safety_filter), count)
+        self._config = config
         self._action_changers, self._delay_periods = action_changers, delay_periods
-        self._terms = _terms(config, safety_filter)
-        self.reasons = np.full(count, "", dtype=object)
-        self._applies = np.ones(count, dtype=bool)
-        self._is_outside = np.zeros(count, dtype=bool)
-
-    @property
-    def applies(self) -> BoolArray:
-        """Whether the promise covers the episodes as far as is known by now, (n,)."""
-        return self._applies.copy()
-
-    @property
-    def words(self) -> list[str]:
-        """The same as a list."""
-        return list(self.reasons)
-
-    @words.setter
-    def words(self, words: list[str]) -> None:
-        self.reasons = np.array(words, dtype=object)
-        self._note()
-
-    def begin(self, observation: Array, memory: Any, started: BoolArray) -> None:
-        """Judge episodes at their start.
-
-        Args:
-            observation: the first ones, (n, size).
-            memory: the filter's, which has begun.
-            started: which episodes start, (n,).
-        """
-        self.reasons[started] = self.configuration_reason
-        self._is_outside[started] = False
-        self._note()
-        for i in np.flatnonzero(started & self._applies).tolist():
-            self.reasons[i] = self._terms.start_reason(observation, i)
-        self._note()
-        if (started & self._applies).any():
-            inside = self._filter.inside(observation, memory)
-            self._is_outside |= started & self._applies & ~inside
-            self.reasons[started & self._is_outside] = self._terms.outside_reason
-            self._note()
-
-    def watch(
-        self, surprise: Array, observation: Array, memory: Any, idle: BoolArray | None
-    ) -> None:
-        """Judge a control period by what it brought.
-
-        Args:
-            surprise: accelerations beside those foreseen, (n, 3) m/s².
-            observation: at its end, (n, size).
-            memory: the filter's, which has concluded it.
-            idle: episodes that only go along, (n,).
-        """
-        watched = self._applies | self._is_outside
-        if idle is not None:
-            watched &= ~idle
-        if not watched.any():
-            return
-        broken, reason_of = self._terms.broken(surprise, observation, memory)
-        for i in np.flatnonzero(broken & watched).tolist():
-            self.reasons[i], self._is_outside[i], self._applies[i] = reason_of(i), False, False
-        if self._is_outside.any():
-            returned = self._is_outside & self._filter.inside(observation, memory)
-            self.reasons[returned], self._is_outside[returned] = "", False
-            self._applies |= returned
-
-    def _note(self) -> None:
-        self._applies = self.reasons == ""
 
     @cached_property
     def configuration_reason(self) -> str:
@@ -180,7 +104,7 @@ class Applicability:
 def _terms(config: TransportConfig, safety_filter: SafetyFilter) -> Terms:
     if isinstance(safety_filter, NuMaxFilter):
         return NuMaxTerms(config, safety_filter.certificate)
-    if isinstance(safety_filter, StorageFilter):
+    if isinstance(safety_filter, StorageKeeping):
         return StorageTerms(config, safety_filter)
     raise CertificateError(
         "safety_filter", safety_filter, "a filter of this package's family", "See make_filter."

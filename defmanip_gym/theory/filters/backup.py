@@ -22,13 +22,18 @@ from defmanip_gym.theory.filters.barrier import (
     StorageLevels,
     coasting,
     speed_excess,
-    uncertain_storage,
 )
 from defmanip_gym.theory.filters.decision import between, clipped
 from defmanip_gym.theory.filters.foresight import advance_robot
 from defmanip_gym.theory.filters.limits import farthest_share, forward_range, upward_range
 from defmanip_gym.theory.filters.sensed import Sensed
-from defmanip_gym.theory.filters.storage import StorageModel, power_of, storage_at, swing_step
+from defmanip_gym.theory.filters.storage import (
+    StorageModel,
+    power_of,
+    storage_at,
+    swing_step,
+    uncertain_storage,
+)
 
 _NOT_REACHED = -1e-6  # margin of a rollout that stays within the tube but does not end
 _FADING = 0.9  # share of the acceleration beside what is foreseen that is left after a period
@@ -174,7 +179,7 @@ def _rolled_out(
         if period > 1 + setup.delay:
             command = backup_command(setup, rate, ahead, 0)
             beside = _FADING * beside[0], _FADING * beside[1], _FADING * beside[2]
-        forward, upward, yaw_rate = advance_robot(limits, command, beside, ahead, 0)
+        grasp, yaw_rate, _ = advance_robot(limits, command, beside, ahead, 0)
         for j in range(len(swung.swing)):
             swung.swing[j], swung.swing_rate[j] = ahead.swing[0, j], ahead.swing_rate[0, j]
         for _ in range(setup.substeps):
@@ -183,8 +188,8 @@ def _rolled_out(
                 r,
                 swung.swing,
                 swung.swing_rate,
-                forward,
-                upward,
+                grasp[0],
+                grasp[2],
                 yaw_rate,
                 step_s,
                 swung,

@@ -19,7 +19,8 @@ from defmanip_gym.theory.filters.backup_decision import decide_backup_all, show_
 from defmanip_gym.theory.filters.safety_filter import BoolArray, FilterDecision, FilterProof
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage import StorageModel
-from defmanip_gym.theory.filters.storage_filter import StorageFilter, StorageMemory
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.theory.filters.storage_keeping import StorageMemory
 from defmanip_gym.theory.payload.object_model import HangingBeam
 
 _HORIZON = 100  # periods
@@ -60,9 +61,11 @@ class BackupFilter(StorageFilter):
     name = "backup"
     proof: FilterProof = "nominal"
 
-    def covers(self, beam: BeamParams) -> bool:
+    def covers(self, carried: object) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, damping too."""
-        return self.intervals.cover_damping(self.beam, beam) and super().covers(beam)
+        if not isinstance(carried, BeamParams):
+            return False
+        return self.intervals.cover_damping(self.beam, carried) and super().covers(carried)
 
     def inside(self, observation: Array, memory: StorageMemory) -> BoolArray:
         """Whether B is below its level or a backup law, from now on, is shown to be safe, (n,)."""

@@ -8,26 +8,27 @@ from typing import NamedTuple
 import numpy as np
 
 from defmanip_gym.compiled import compilable
-from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.robot_model import reach_and_height, reach_and_height_slopes
+from defmanip_gym.theory.filters.carried import (
+    CarriedModel,
+    CarriedRoom,
+    power_of_carried,
+    step_carried,
+    stored_in_carried,
+    uncertain_in_carried,
+)
 from defmanip_gym.theory.filters.limits import RobotLimits
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
 from defmanip_gym.theory.filters.sensed import Sensed
-from defmanip_gym.theory.filters.storage import (
-    StorageModel,
-    StorageRoom,
-    power_of,
-    storage_at,
-    swing_step,
-)
+from defmanip_gym.theory.filters.storage import StorageRoom
 
 
 class StorageLevels(NamedTuple):
     """What the decision depends on.
 
     Attributes:
-        model: of the beams that may be carried.
+        model: of the beams that may be carried, or of the object.
         levels: up to which B may rise, (C,) J.
         momenta: s_f at its largest within V ≤ V_σ, (C,) kg·m/s.
         errors: of the period's mean acceleration about what is foreseen, (3,) m/s².
@@ -35,7 +36,7 @@ class StorageLevels(NamedTuple):
         limits: of the robot.
     """
 
-    model: StorageModel
+    model: CarriedModel
     levels: Array
     momenta: Array
     errors: Array
@@ -46,15 +47,16 @@ class StorageLevels(NamedTuple):
 class DecisionRoom(NamedTuple):
     """Room for one state, and what was found out about the last command that was judged."""
 
-    storage: StorageRoom
+    storage: CarriedRoom
     gradient: Array  # (3,): −∂B/∂w of the beam that allows least, J per m/s²
     swing: Array  # (N,)
     swing_rate: Array  # (N,)
 
     @classmethod
-    def empty(cls, segments: int) -> DecisionRoom:
-        """Return room for N segments."""
-        return cls(StorageRoom.empty(segments), np.empty(3), np.empty(segments), np.empty(segments))
+    def empty(cls, count: int, storage: CarriedRoom | None = None) -> DecisionRoom:
+        """Return room for N segments of a rod, or for what another ``storage`` is the room of."""
+        room = StorageRoom.empty(count) if storage is None else storage
+        return cls(room, np.empty(3), np.empty(count), np.empty(count))
 
 
 @compilable
@@ -99,33 +101,36 @@ def excess_after(
     )
     reach, _ = reach_and_height(limits.arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
     forward, upward = forward + residual[i, 0], upward + residual[i, 2]
+    left += residual[i, 1]
     yaw_rate = sensed.base_velocity[i, 1]
-    later_yaw_rate = yaw_rate + period_s * (turning + residual[i, 1] / reach)
+    turning += residual[i, 1] / reach
+    later_yaw_rate = yaw_rate + period_s * turning
     middle_yaw_rate = 0.5 * (yaw_rate + later_yaw_rate)
     fast = speed_excess(
         limits.max_speed_m_s,
         sensed.velocity_b[i, 0] + period_s * forward,
-        sensed.velocity_b[i, 1] + period_s * (left + residual[i, 1]),
+        sensed.velocity_b[i, 1] + period_s * left,
         sensed.velocity_b[i, 2] + period_s * upward,
     )
     for j in range(len(room.swing)):
         room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
     largest = -np.inf
     for c in range(len(setup.levels)):
-        swing_step(
+        step_carried(
             model,
             c,
             room.swing,
             room.swing_rate,
-            forward,
-            upward,
+            (forward, left, upward),
             middle_yaw_rate,
+            turning,
             period_s,
             room.storage,
         )
-        s_forward, s_upward, inertia = power_of(model, c, room.storage)
-        leftward = -middle_yaw_rate * inertia / reach
-        after = storage_at(
+        s_forward, leftward, s_upward = power_of_carried(
+            model, c, middle_yaw_rate, reach, room.storage
+        )
+        after = stored_in_carried(
             model, c, room.storage.swing, room.storage.swing_rate, later_yaw_rate, room.storage
         )
         after += setup.momenta[c] * fast
@@ -134,7 +139,7 @@ def excess_after(
             + abs(leftward) * setup.errors[1]
             + abs(s_upward) * setup.errors[2]
         )
-        after += uncertain_storage(model, c, uncertainty, i, room.storage)
+        after += uncertain_in_carried(model, c, uncertainty, i, room.storage)
         excess = (after - setup.levels[c]) / model.passes[c] + setup.residual
         if excess > largest:
             largest = excess
@@ -146,28 +151,10 @@ def excess_after(
 
 
 @compilable
-def uncertain_storage(
-    model: StorageModel, c: int, uncertainty: Array, i: int, room: StorageRoom
-) -> float:
-    """Return how much more than in ``room`` may be stored, J, if angles are uncertain.
-
-    Args:
-        model: of the beams.
-        c: which of them.
-        uncertainty: of the swing, (n, N) rad.
-        i: which state.
-        room: what ``storage_at`` left of that state's swing, which is in ``room.swing``.
-    """
-    more = 0.0
-    for j in range(len(room.swing)):
-        slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.sine[j])
-        for k in range(len(room.swing)):
-            slope += abs(model.stiffness[c, j, k] * room.swing[k])
-            curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
-            more += 0.5 * curvature * uncertainty[i, j]
-        curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
-        more += (slope + 0.5 * curvature) * uncertainty[i, j]
-    return more
+def reach_rate_of(limits: RobotLimits, sensed: Sensed, i: int) -> float:
+    """Return ρ̇ of state i, m/s."""
+    upper, fore, _, _ = reach_and_height_slopes(limits.arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
+    return upper * sensed.pitch_rate[i, 0] + fore * sensed.pitch_rate[i, 1]
 
 
 @compilable
@@ -184,9 +171,7 @@ def coasting(
 
     A base that is pushed backwards turns away by itself; holding its yaw rate slows the grasp.
     """
-    arm = setup.limits.arm
-    rho_1, rho_2, _, _ = reach_and_height_slopes(arm, sensed.pitch[i, 0], sensed.pitch[i, 1])
-    reach_rate = rho_1 * sensed.pitch_rate[i, 0] + rho_2 * sensed.pitch_rate[i, 1]
+    reach_rate = reach_rate_of(setup.limits, sensed, i)
     pushed = min(sensed.base_velocity[i, 0] + 2.0 * reach_rate, 0.0)
     turning = sensed.base_velocity[i, 1] * pushed
     return -beside[0], turning - beside[1], -beside[2]

@@ -8,11 +8,12 @@ from defmanip_gym.compiled import compilable, compiled
 from defmanip_gym.theory.control.control_laws import limited_acceleration
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels, speed_excess
+from defmanip_gym.theory.filters.carried import step_carried, stored_in_carried
 from defmanip_gym.theory.filters.decision import decide
-from defmanip_gym.theory.filters.foresight import advance
+from defmanip_gym.theory.filters.foresight import advance, advance_robot
+from defmanip_gym.theory.filters.limits import RobotLimits
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
 from defmanip_gym.theory.filters.sensed import Sensed, gained_acceleration
-from defmanip_gym.theory.filters.storage import storage_at, swing_step
 
 
 @compiled
@@ -111,7 +112,7 @@ def store_all(setup: StorageLevels, sensed: Sensed, room: DecisionRoom, shares: 
         )
         shares[i] = 0.0
         for c in range(len(setup.levels)):
-            stored = storage_at(
+            stored = stored_in_carried(
                 setup.model,
                 c,
                 room.swing,
@@ -133,6 +134,27 @@ def advance_all(
 
 
 @compiled
+def drive_all(
+    limits: RobotLimits, commands: Array, beside: Array, sensed: Sensed, motions: Array
+) -> None:
+    """Move n robots on by a period of their commands, in place; what they carry stays.
+
+    Args:
+        limits: of the robots.
+        commands: (n, 3) m/s².
+        beside: accelerations beside those foreseen, (n, 3) m/s².
+        sensed: the states.
+        motions: the result, (n, 4): the grasp's mean acceleration, m/s², and u̇2, rad/s².
+    """
+    for i in range(len(commands)):
+        command = commands[i, 0], commands[i, 1], commands[i, 2]
+        pushed = beside[i, 0], beside[i, 1], beside[i, 2]
+        grasp, _, turning = advance_robot(limits, command, pushed, sensed, i)
+        motions[i, 0], motions[i, 1], motions[i, 2] = grasp[0], grasp[1], grasp[2]
+        motions[i, 3] = turning
+
+
+@compiled
 def misjudge_all(
     setup: StorageLevels,
     before: Sensed,
@@ -150,22 +172,23 @@ def misjudge_all(
         shares: the result, (n,).
     """
     for i in range(len(shares)):
-        forward, _, up = gained_acceleration(before, after, i, setup.limits.period_s)
+        period_s = setup.limits.period_s
+        gained = gained_acceleration(before, after, i, period_s)
         yaw_rate, later_yaw_rate = before.base_velocity[i, 1], after.base_velocity[i, 1]
         for j in range(len(room.swing)):
             room.swing[j], room.swing_rate[j] = before.swing[i, j], before.swing_rate[i, j]
-        swing_step(
+        step_carried(
             setup.model,
             0,
             room.swing,
             room.swing_rate,
-            forward,
-            up,
+            gained,
             0.5 * (yaw_rate + later_yaw_rate),
-            setup.limits.period_s,
+            (later_yaw_rate - yaw_rate) / period_s,
+            period_s,
             room.storage,
         )
-        foreseen = storage_at(
+        foreseen = stored_in_carried(
             setup.model,
             0,
             room.storage.swing,
@@ -175,7 +198,7 @@ def misjudge_all(
         )
         for j in range(len(room.swing)):
             room.swing[j], room.swing_rate[j] = after.swing[i, j], after.swing_rate[i, j]
-        stored = storage_at(
+        stored = stored_in_carried(
             setup.model, 0, room.swing, room.swing_rate, later_yaw_rate, room.storage
         )
         shares[i] = (stored - foreseen) / setup.model.passes[0]

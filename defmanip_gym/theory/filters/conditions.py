@@ -9,7 +9,7 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.validation import require_number, require_range, require_whole, settle
 
-_LARGEST_ERROR = 1000.0
+LARGEST_ERROR = 1000.0
 _LONGEST_DELAY = 50
 _SMALLEST_FACTOR, LARGEST_FACTOR = 0.01, 100.0
 _ROUNDING = 1e-9
@@ -50,7 +50,7 @@ class FilterConditions:
             "forward_offset_m_s2",
             "vertical_offset_m_s2",
         ):
-            settle(self, name, require_number, 0.0, _LARGEST_ERROR, "m/s²")
+            settle(self, name, require_number, 0.0, LARGEST_ERROR, "m/s²")
         settle(self, "storage_error", require_number, 0.0, 1.0)
         settle(self, "swing_noise_rad", require_number, 0.0, 1.0, "rad")
         settle(self, "delay_periods", require_whole, 0, _LONGEST_DELAY)

@@ -18,7 +18,9 @@ from defmanip_gym.theory.filters.barrier import (
     StorageLevels,
     coasting,
     excess_after,
+    reach_rate_of,
 )
+from defmanip_gym.theory.filters.carried import reversing_with_carried
 from defmanip_gym.theory.filters.limits import (
     braking,
     farthest_share,
@@ -84,17 +86,29 @@ def decide(
     forward_low, forward_high = forward_range(limits, reach, sensed.base_velocity[i, 1])
     up_low, up_high = upward_range(limits, reach, height, velocity[2])
     is_possible = forward_low <= effective[0] <= forward_high and up_low <= effective[2] <= up_high
+    back_low, left_low, left_high = reversing_with_carried(
+        setup.model,
+        velocity[0] + reach_rate_of(limits, sensed, i),
+        sensed.base_velocity[i, 1],
+        reach,
+        limits.period_s,
+    )
+    back_low = min(back_low - residual[i, 0], forward_high)
+    left_low, left_high = left_low - residual[i, 1], left_high - residual[i, 1]
+    is_possible = is_possible and back_low <= effective[0] and left_low <= effective[1] <= left_high
     excess = excess_after(setup, effective, sensed, i, residual, uncertainty, room)
     if is_possible and excess <= 0.0:
         allowed[i, 0], allowed[i, 1], allowed[i, 2] = wished[i, 0], wished[i, 1], wished[i, 2]
         return -excess
     largest = limits.max_acceleration_m_s2
-    low, high = (forward_low, -largest, up_low), (forward_high, largest, up_high)
+    left_low = min(max(left_low, -largest), largest)
+    left_high = max(min(left_high, largest), -largest)
+    low, high = (max(forward_low, back_low), left_low, up_low), (forward_high, left_high, up_high)
     moved, excess = within(
         setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
     )
     if excess > 0.0:  # rather out of the arm's range than beyond the level
-        low, high = (forward_low, -largest, -largest), (forward_high, largest, largest)
+        low, high = (low[0], low[1], -largest), (high[0], high[1], largest)
         moved, excess = within(
             setup, effective, sensed, i, residual, uncertainty, room, velocity, low, high
         )

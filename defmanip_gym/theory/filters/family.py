@@ -8,6 +8,7 @@ from typing import Any
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.filters.backup_filter import BackupFilter
 from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
+from defmanip_gym.theory.filters.object_filter import ObjectStorageFilter
 from defmanip_gym.theory.filters.qp_filter import CbfQpFilter
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
@@ -23,6 +24,7 @@ FILTERS: dict[str, type[SafetyFilter]] = {
     NuMaxFilter.name: NuMaxFilter,
     **STORAGE_FILTERS,
     **REFERENCE_FILTERS,
+    ObjectStorageFilter.name: ObjectStorageFilter,  # for objects from files, not for rods
 }
 
 

@@ -10,10 +10,10 @@ from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.redundancy import shared_acceleration
 from defmanip_gym.theory.dynamics.robot_model import reach_and_height
 from defmanip_gym.theory.filters.barrier import DecisionRoom, StorageLevels
+from defmanip_gym.theory.filters.carried import step_carried
 from defmanip_gym.theory.filters.limits import RobotLimits
 from defmanip_gym.theory.filters.period_mean import mean_acceleration
 from defmanip_gym.theory.filters.sensed import Sensed
-from defmanip_gym.theory.filters.storage import swing_step
 
 
 @compilable
@@ -37,12 +37,20 @@ def advance(
     """
     beside = residual[i, 0], residual[i, 1], residual[i, 2]
     command = commands[i, 0], commands[i, 1], commands[i, 2]
-    forward, up, yaw_rate = advance_robot(setup.limits, command, beside, sensed, i)
+    grasp, yaw_rate, turning = advance_robot(setup.limits, command, beside, sensed, i)
     for j in range(len(room.swing)):
         room.swing[j], room.swing_rate[j] = sensed.swing[i, j], sensed.swing_rate[i, j]
     period_s = setup.limits.period_s
-    swing_step(
-        setup.model, 0, room.swing, room.swing_rate, forward, up, yaw_rate, period_s, room.storage
+    step_carried(
+        setup.model,
+        0,
+        room.swing,
+        room.swing_rate,
+        grasp,
+        yaw_rate,
+        turning,
+        period_s,
+        room.storage,
     )
     for j in range(len(room.swing)):
         sensed.swing[i, j] = room.storage.swing[j]
@@ -56,8 +64,8 @@ def advance_robot(
     beside: tuple[float, float, float],
     sensed: Sensed,
     i: int,
-) -> tuple[float, float, float]:
-    """Move robot and grasp of a state on by a period, in place; return what that does to its beam.
+) -> tuple[tuple[float, float, float], float, float]:
+    """Move robot and grasp of a state on by a period; return what that does to its object.
 
     Args:
         limits: of the robot.
@@ -67,7 +75,8 @@ def advance_robot(
         i: which of them.
 
     Returns:
-        Mean acceleration forward and upward, m/s², and the yaw rate in the period's middle, rad/s.
+        The grasp's mean acceleration forward, left and upward, m/s², the yaw rate in the period's
+        middle, rad/s, and u̇2, rad/s².
     """
     period_s, half = limits.period_s, 0.5 * limits.period_s
     velocity, base, rate = sensed.velocity_b, sensed.base_velocity, sensed.pitch_rate
@@ -127,4 +136,4 @@ def advance_robot(
     sensed.pitch[i, 1] += period_s * (rate[i, 1] + half * fore_dot)
     rate[i, 0] += period_s * upper_dot
     rate[i, 1] += period_s * fore_dot
-    return forward, up, yaw_rate
+    return (forward, left, up), yaw_rate, turning

@@ -84,9 +84,9 @@ class NuMaxFilter(SafetyFilter):
             "task": plain(self.task),
         }
 
-    def covers(self, beam: BeamParams) -> bool:
+    def covers(self, carried: object) -> bool:
         """Whether the certificate holds for this beam."""
-        return self.certificate.covers(beam)
+        return isinstance(carried, BeamParams) and self.certificate.covers(carried)
 
     def memory(self, count: int) -> NuMaxMemory:
         """Return the memory of n episodes."""

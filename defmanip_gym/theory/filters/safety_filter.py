@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.errors import ActionError, ParameterError
-from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.params import RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.validation import number_array
 
 BoolArray = NDArray[np.bool_]
 
-# for which model of the object invariance is proven; "nominal": that a filter rolls out
+# for which model of the object invariance is proven; "nominal": that a filter rolls out, or that
+# has the bounds which its search found
 FilterProof = Literal["nonlinear", "nominal", "linear", "none"]
 
 
@@ -65,8 +66,8 @@ class SafetyFilter(ABC):
         return hash(json.dumps(self.specification, sort_keys=True))
 
     @abstractmethod
-    def covers(self, beam: BeamParams) -> bool:
-        """Whether its promise holds for this beam."""
+    def covers(self, carried: object) -> bool:
+        """Whether its promise holds for this object: ``BeamParams``, or a ``Linkage``."""
 
     @abstractmethod
     def memory(self, count: int) -> Any:

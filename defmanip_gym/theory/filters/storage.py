@@ -241,3 +241,28 @@ def power_of(model: StorageModel, c: int, room: StorageRoom) -> tuple[float, flo
         for k in range(len(room.rate)):
             inertia -= model.coupling[c, j, k] * room.sine[j] * room.sine[k]
     return forward, upward, inertia
+
+
+@compilable
+def uncertain_storage(
+    model: StorageModel, c: int, uncertainty: Array, i: int, room: StorageRoom
+) -> float:
+    """Return how much more than in ``room`` may be stored, J, if angles are uncertain.
+
+    Args:
+        model: of the beams.
+        c: which of them.
+        uncertainty: of the swing, (n, N) rad.
+        i: which state.
+        room: what ``storage_at`` left of that state's swing, which is in ``room.swing``.
+    """
+    more = 0.0
+    for j in range(len(room.swing)):
+        slope = GRAVITY_M_S2 * model.moments[c, j] * abs(room.sine[j])
+        for k in range(len(room.swing)):
+            slope += abs(model.stiffness[c, j, k] * room.swing[k])
+            curvature = abs(model.stiffness[c, j, k]) * uncertainty[i, k]
+            more += 0.5 * curvature * uncertainty[i, j]
+        curvature = GRAVITY_M_S2 * model.moments[c, j] * uncertainty[i, j]
+        more += (slope + 0.5 * curvature) * uncertainty[i, j]
+    return more

@@ -75,7 +75,8 @@ class NominalModel:
     def step(self, command):
         limits, room = self.setup.storage.limits, self.room
         room.swing[:], room.swing_rate[:] = self.sensed.swing[0], self.sensed.swing_rate[0]
-        pushed = advance_robot(limits, tuple(command), (0.0, 0.0, 0.0), self.sensed, 0)
+        grasp, yaw_rate, _ = advance_robot(limits, tuple(command), (0.0, 0.0, 0.0), self.sensed, 0)
+        pushed = grasp[0], grasp[2], yaw_rate
         step_s = limits.period_s / self.setup.substeps
         for _ in range(self.setup.substeps):
             swing_step(self.setup.rolled, 0, room.swing, room.swing_rate, *pushed, step_s, room)
