@@ -1,7 +1,7 @@
 """Where the oriented field arrives from, and how soon, alone and inside the storage filter.
 
-Suites ``nominal`` and ``far``, and random starts 0.5 to 18 m away in all directions with any heading.
-Times are told as multiples of straight flight, the distance at full speed.
+Suites ``nominal`` and ``far``, and random starts 0.5 to 18 m away in all directions with any
+heading. Times are told as multiples of straight flight, the distance at full speed.
 
     python benchmarks/from_everywhere.py
     python benchmarks/from_everywhere.py --starts 100 --filters none
@@ -68,8 +68,8 @@ def main() -> None:
             flights = np.array([r.start_distance_m / r.speed_limit_m_s for r in good])
             swing = max(record.largest_swing_share for record in records)
             print(
-                f"{name:10s} {kind:8s} {dict(Counter(r.outcome for r in records))} of {len(records)}"
-                f" | median {np.median(times):.2f} s, 90 % {np.percentile(times, 90):.2f} s, "
+                f"{name:10s} {kind:8s} {dict(Counter(r.outcome for r in records))} "
+                f"| median {np.median(times):.2f} s, 90 % {np.percentile(times, 90):.2f} s, "
                 f"{np.median(times / flights):.2f} x flight | swing {swing:.2f} sigma",
                 flush=True,
             )

@@ -9,7 +9,7 @@ import numpy as np
 from defmanip_gym.baselines.analytic.tanner import TannerParams
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.theory.control.gain_search import loop_with_margin
+from defmanip_gym.theory.control.gain_search import loop_with_margin, slowest_swing
 from defmanip_gym.theory.control.stability import SampledLoop
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 from defmanip_gym.validation import require_params, require_range
@@ -28,7 +28,8 @@ def gains_for(
 
     The environment's linearization is taken to count on no damping at the root, as its default
     does. With many segments the force loop grows weak unless the damping is known well:
-    ``damping_factors`` says how well.
+    ``damping_factors`` says how well. The damping that the force law assumes is carried over as
+    what it adds to the slowest swing of the reference beam.
 
     Args:
         beam: the object.
@@ -47,6 +48,8 @@ def gains_for(
     task = TaskParams() if task is None else require_params("task", task, TaskParams)
     params = TannerParams() if params is None else require_params("params", params, TannerParams)
     factors = require_range("damping_factors", damping_factors, 0.0, 1e3)
+    reference = BeamParams()
+    per_damping, _, _ = slowest_swing(reference)
     found = loop_with_margin(
         SampledLoop(
             robot=robot,
@@ -60,6 +63,7 @@ def gains_for(
             period_s=task.control_period_s,
             feedforward=params.feedforward,
         ),
+        added_ratio=max(per_damping * (reference.damping - params.force_law_damping), 0.0),
         margin=margin,
         damping_factors=factors,
     )

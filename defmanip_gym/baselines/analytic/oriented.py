@@ -12,8 +12,9 @@ from defmanip_gym.theory.control.control_laws import ForceLoopGains
 ORIENTED_PARAMS = TannerParams(
     velocity_field="oriented",
     tracking_gain=4.0,
-    approach_rate=6.0,
-    gains=ForceLoopGains(k1=0.05, k2=8.0),
+    approach_rate=7.0,
+    gains=ForceLoopGains(k1=0.0, k2=9.4),
+    force_law_damping=-0.076,  # less than none: the force loop damps the swing
     yaw_rate_bound=1.5,
     bound_share=0.7,
     deceleration_share=0.5,

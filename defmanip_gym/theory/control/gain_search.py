@@ -25,11 +25,10 @@ from defmanip_gym.theory.control.stability import SampledLoop
 from defmanip_gym.theory.payload.zero_dynamics import linearize
 from defmanip_gym.validation import require_between
 
-# Shares of the wished gains, and damping ratios added to the slowest swing, in the order in which
-# they are given up. 0.081 is what d̂ = 0 adds to the reference beam.
+# Shares of what is wished for.
 _TRACKING_SHARES = (1.0, 0.7, 0.5, 0.3)
 _FORCE_LOOP_SHARES = (1.0, 0.7, 0.5, 0.3, 0.15, 0.05, 0.015, 0.005)
-_ADDED_RATIOS = (0.081, 0.04, 0.02, 0.0)
+_ADDED_SHARES = (1.0, 0.5, 0.25, 0.0)
 _LARGEST_MARGIN = 2.0
 
 
@@ -52,15 +51,21 @@ def slowest_swing(beam: BeamParams) -> tuple[float, float, float]:
 
 
 def loop_with_margin(
-    wished: SampledLoop, *, margin: float, damping_factors: tuple[float, float]
+    wished: SampledLoop,
+    *,
+    added_ratio: float,
+    margin: float,
+    damping_factors: tuple[float, float],
 ) -> SampledLoop:
     """Return a loop with the margin, as near to the wished one as a coarse search comes.
 
-    Tracking gain and approach rate are the last to be lowered, k1 and k2 the next, each pair in
-    proportion; ``force_law_damping`` is set anew.
+    Tracking gain and approach rate are the last to be lowered, each pair in proportion, k1 and k2
+    the next, and what the force law adds to the slowest swing's damping the first.
 
     Args:
         wished: with the gains that would be wished for; its damping in the force law is ignored.
+        added_ratio: damping ratio that the force law would be wished to add; d̂ = 0 adds 0.081 to
+            the reference beam.
         margin: least disk margin, in (0, 2).
         damping_factors: least and largest damping of the object's root, as multiples of the known
             one, with which the loop must be stable, too.
@@ -70,7 +75,7 @@ def loop_with_margin(
     """
     margin = require_between("margin", margin, 0.0, _LARGEST_MARGIN)
     best = DiskMargin(0.0, 0.0)
-    for candidate in _candidates(wished):
+    for candidate in _candidates(wished, added_ratio):
         found = disk_margin(candidate)
         if found.margin >= margin and _is_stable(candidate, damping_factors):
             return candidate
@@ -90,14 +95,14 @@ def _is_stable(loop: SampledLoop, damping_factors: tuple[float, float]) -> bool:
     return all(replace(loop, beam=other).spectral_radius() < 1.0 for other in others)
 
 
-def _candidates(wished: SampledLoop) -> Iterator[SampledLoop]:
+def _candidates(wished: SampledLoop, added_ratio: float) -> Iterator[SampledLoop]:
     per_damping, _, _ = slowest_swing(wished.beam)
-    for tracking, force, ratio in product(_TRACKING_SHARES, _FORCE_LOOP_SHARES, _ADDED_RATIOS):
+    for tracking, force, added in product(_TRACKING_SHARES, _FORCE_LOOP_SHARES, _ADDED_SHARES):
         gains = ForceLoopGains(k1=force * wished.gains.k1, k2=force * wished.gains.k2)
         yield replace(
             wished,
             gains=gains,
-            force_law_damping=wished.beam.damping - ratio / per_damping,
+            force_law_damping=wished.beam.damping - added * added_ratio / per_damping,
             tracking_gain=tracking * wished.tracking_gain,
             approach_rate=tracking * wished.approach_rate,
         )

@@ -1,64 +1,22 @@
 """A velocity field whose streamlines all reach the goal along +x, by short ways.
 
-The dipole of Section VI looks the same at every scale: from far away it leads in wide circles, and
-from x > 0 it leads in along −x. Here a way goes straight to one of the two circles of radius R that
-touch the x axis at the goal, and along it to the goal; within a circle the dipole's own, smaller
-circles go on. L. E. Dubins, "On curves of minimal length with a constraint on average curvature",
-American Journal of Mathematics 79 (1957), has such ways as the shortest ones.
+Derivation: docs/derivations.md, section 21.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
+from defmanip_gym.theory.control.ways import Way, way_to_goal
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.validation import require_positive, settle
 
-_TINY = 1e-12
 # Forwards and in reverse: a way in reverse is one forwards in a mirror at the y axis.
 _GEARS = np.array([1.0, -1.0])
 # What a turn to a way's course counts for against the way itself, as a share of its time.
 _TURN_SHARE = 0.7
-
-
-class Way(NamedTuple):
-    """From points to the goal: straight on, then along an arc that ends along +x; (...) each.
-
-    Attributes:
-        course: direction at the point, rad.
-        straight_m: length of the straight part.
-        arc_rad: how far the arc turns.
-        radius_m: of the arc.
-    """
-
-    course: Array
-    straight_m: Array
-    arc_rad: Array
-    radius_m: Array
-
-
-def way_to_goal(x: Array, y: Array, turn_radius_m: float) -> Way:
-    """Return the way from each point, over the circle on its own side of the x axis.
-
-    Continuous but for the half line y = 0, x > 0, from which it leads away on both sides.
-
-    Args:
-        x: relative to the goal, (...) m.
-        y: likewise.
-        turn_radius_m: R.
-    """
-    side, y = np.where(y < 0, -1.0, 1.0), np.abs(y)
-    square = x**2 + y**2
-    power = square - 2 * turn_radius_m * y  # of the point with respect to the circle
-    radius = np.where(power < 0, square / np.maximum(2 * y, _TINY), turn_radius_m)
-    straight = np.sqrt(np.maximum(power, 0.0))
-    # towards the circle's centre, and from there to its tangent
-    course = np.arctan2(radius - y, -x) - np.arctan2(radius, straight)
-    arc = np.where((course > 0) & (x > 0), 2 * np.pi - course, np.maximum(-course, 0.0))
-    return Way(side * course, straight, arc, radius)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +39,7 @@ class OrientedField:
         turn_radius_m: R.
         turn_rate_per_s: yaw rate per heading error.
         look_ahead_s: how far ahead on its way the robot looks for its course.
+        straightening_radius_m: of the axle, within which arcs shrink, as it can turn on the spot.
         settling_radius_m: of the axle, within which ways give way to turning and driving at once.
     """
 
@@ -94,7 +53,8 @@ class OrientedField:
     turn_radius_m: float = 1.5
     turn_rate_per_s: float = 3.0
     look_ahead_s: float = 0.2
-    settling_radius_m: float = 0.13
+    straightening_radius_m: float = 0.5
+    settling_radius_m: float = 0.155
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
@@ -123,7 +83,7 @@ class OrientedField:
         near_speed = -np.sign(x) * self._braking(np.abs(x), self.deceleration_m_s2)
         near_rate = -self.approach_rate_per_s * (_wrapped(heading) + y / self.reach_m)
         square = (x**2 + y**2) / self.settling_radius_m**2
-        share = square**2 / (1.0 + square**2)
+        share = square**4 / (1.0 + square**4)
         limit = min(self.yaw_rate_rad_s, self.max_speed_m_s / self.reach_m)
         speed = share * speed + (1.0 - share) * near_speed * np.cos(heading)
         yaw_rate = share * yaw_rate + (1.0 - share) * np.clip(near_rate, -limit, limit)
@@ -134,16 +94,16 @@ class OrientedField:
     def _following(self, x: Array, y: Array, heading: Array) -> tuple[Array, Array]:
         """Return u1 and u2 towards the better of the two ways, forwards and in reverse."""
         gear = _GEARS.reshape(2, *np.ones(x.ndim, dtype=int))
-        way = way_to_goal(gear * x, y, self.turn_radius_m)
+        near = (x**2 + y**2) / self.straightening_radius_m**2
+        radius = self.turn_radius_m * np.minimum(1.0, near)
+        way = way_to_goal(gear * x, y, radius)
         speed, course = self._speed(way), gear * way.course
         error = _wrapped(course - heading)
         limit = min(self.yaw_rate_rad_s, self.max_speed_m_s / self.reach_m)
         arc = way.arc_rad * np.maximum(1.0 / limit, way.radius_m / self.max_speed_m_s)
         time = way.straight_m / self.max_speed_m_s + arc + _TURN_SHARE * np.abs(error) / limit
         ahead = self.look_ahead_s * gear * speed
-        there = way_to_goal(
-            gear * (x + ahead * np.cos(course)), y + ahead * np.sin(course), self.turn_radius_m
-        )
+        there = way_to_goal(gear * (x + ahead * np.cos(course)), y + ahead * np.sin(course), radius)
         turn = self.turn_rate_per_s * _wrapped(gear * there.course - heading)
         speed = gear * speed * np.maximum(np.cos(error), 0.0)
         turn = np.clip(turn, -limit, limit)

@@ -4,6 +4,7 @@ import math
 
 import gymnasium
 import numpy as np
+import pytest
 
 from defmanip_gym.baselines.analytic.oriented import ORIENTED_PARAMS, make_controller
 from defmanip_gym.baselines.analytic.tanner import TannerController
@@ -45,6 +46,13 @@ def test_arrives_from_all_sides_with_all_headings_within_sigma():
     assert not np.isnan(time).any()
     assert np.median(time) < 8.0  # 4.5 s of straight flight
     assert largest.max() < 1.0
+
+
+def test_the_reference_beam_gets_the_parameters_as_they_are():
+    found = make_controller(TransportConfig()).params
+    assert found.gains == ORIENTED_PARAMS.gains
+    assert found.tracking_gain == ORIENTED_PARAMS.tracking_gain
+    assert found.force_law_damping == pytest.approx(ORIENTED_PARAMS.force_law_damping)
 
 
 def test_backs_up_to_a_goal_that_it_has_left_behind():

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from defmanip_gym.errors import ParameterError
-from defmanip_gym.theory.control.oriented_field import OrientedField, way_to_goal
+from defmanip_gym.theory.control.oriented_field import OrientedField
+from defmanip_gym.theory.control.ways import way_to_goal
 
 REACH_M = 0.7
 FIELD = OrientedField(
