@@ -26,6 +26,7 @@ def contestant_colour(base: str, method: str) -> str:
 _GREY = 0x80
 _COLOURS = {
     "tanner": ("#45b5aa", "#12806a"),
+    "oriented": ("#6cc4d6", "#1a7f96"),
     "field": ("#7fb3e6", "#2f7fc1"),
     "lqr": ("#9aa8d8", "#3f51a3"),
     "shaped": ("#a3bf6b", "#5a6e2e"),

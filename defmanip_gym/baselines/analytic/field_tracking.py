@@ -13,7 +13,7 @@ from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.frames import base_to_world, world_to_base
 
 # share of the yaw rate bound that desired velocities use
-_YAW_SHARE = 0.8
+YAW_SHARE = 0.8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,17 +63,18 @@ class FieldTracking:
         The field lives in world axes with the goal at the origin. The paper lets z̈_1d = 0; without
         it the grasp drifts off its streamline.
         """
-        desired = self.field.velocity(now.position)
+        desired = self.field.velocity(now.position, now.heading)
         if not self.feedforward:
             return world_to_base(desired, now.heading), 0.0
         period = self.period_s
         ahead = now.position + period * base_to_world(now.velocity_b, now.heading)
-        rate = (self.field.velocity(ahead) - desired) / period
+        turned = now.heading + period * now.yaw_rate
+        rate = (self.field.velocity(ahead, turned) - desired) / period
         return world_to_base(desired, now.heading), world_to_base(rate, now.heading)
 
     def _with_gentle_turn(self, desired: Array, reach: Array) -> Array:
         """Bound the leftward velocity, which is reach times yaw rate."""
-        limit = _YAW_SHARE * self.yaw_rate_bound * reach
+        limit = YAW_SHARE * self.yaw_rate_bound * reach
         return np.stack(
             (desired[:, 0], np.clip(desired[:, 1], -limit, limit), desired[:, 2]), axis=1
         )

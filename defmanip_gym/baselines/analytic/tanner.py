@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.analytic.cascade import Cascade, LoopMemory
+from defmanip_gym.baselines.analytic.field_tracking import YAW_SHARE
 from defmanip_gym.baselines.analytic.grasp_sample import grasp_sample
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.envs.config import TransportConfig
@@ -23,6 +24,7 @@ from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import Certificate
 from defmanip_gym.theory.control.control_laws import ForceLoopGains
+from defmanip_gym.theory.control.oriented_field import OrientedField
 from defmanip_gym.theory.control.stability import SampledLoop
 from defmanip_gym.theory.control.velocity_field import LiteralField, NormalizedField, VelocityField
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
@@ -37,7 +39,7 @@ from defmanip_gym.validation import (
 )
 
 Array = NDArray[np.float64]
-FieldKind = Literal["normalized", "literal"]
+FieldKind = Literal["normalized", "literal", "oriented"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +50,8 @@ class TannerParams:
 
     Attributes:
         velocity_field: ``"normalized"`` travels the dipole's streamlines with a speed profile,
-            ``"literal"`` is −k ∇φ as printed.
+            ``"literal"`` is −k ∇φ as printed, ``"oriented"`` leads by short ways along +x from
+            anywhere, with any heading.
         literal_k: k of the literal field.
         tracking_gain: ε in L = −ε I, 1/s.
         approach_rate: speed per distance near the goal, 1/s.
@@ -60,6 +63,8 @@ class TannerParams:
         yaw_rate_bound: where no certificate gives one, rad/s.
         bound_share: share of the bounds that u_o uses, leaving the rest to the force loop.
         deceleration_share: share of the bound that the speed profile plans to brake with.
+        speed_share: share of the speed limit that the field uses.
+        turn_radius: R of the oriented field, m.
     """
 
     velocity_field: FieldKind = "normalized"
@@ -73,6 +78,8 @@ class TannerParams:
     yaw_rate_bound: float = 2.5
     bound_share: float = 0.85
     deceleration_share: float = 0.68
+    speed_share: float = 0.9
+    turn_radius: float = 1.5
 
     def __post_init__(self) -> None:
         require_choice("velocity_field", self.velocity_field, get_args(FieldKind))
@@ -84,8 +91,10 @@ class TannerParams:
             "yaw_rate_bound",
             "bound_share",
             "deceleration_share",
+            "turn_radius",
         ):
             settle(self, name, require_positive)
+        settle(self, "speed_share", require_number, 1e-3, 1.0)
         settle(self, "feedforward", require_flag)
         settle(self, "gains", require_params, ForceLoopGains)
         settle(self, "force_law_damping", require_number, -1e4, 1e4, "N m s/rad")
@@ -202,7 +211,11 @@ class TannerController:
         params, certificate = self.params, self.certificate
         if certificate is None:
             forward = min(params.acceleration_bound, self.task.max_acceleration_m_s2)
-            return np.full(3, forward), params.yaw_rate_bound, 0.9 * self.task.max_speed_m_s
+            return (
+                np.full(3, forward),
+                params.yaw_rate_bound,
+                params.speed_share * self.task.max_speed_m_s,
+            )
         conditions = certificate.conditions
         forward = min(certificate.acceleration_bound, self.task.max_acceleration_m_s2)
         upward = min(certificate.vertical_acceleration_bound, self.task.max_acceleration_m_s2)
@@ -210,18 +223,31 @@ class TannerController:
         leftward = (
             self.task.max_acceleration_m_s2 if math.isinf(certificate.speed_bound) else forward
         )
-        speed = 0.9 * min(self.task.max_speed_m_s, certificate.speed_bound)
+        speed = params.speed_share * min(self.task.max_speed_m_s, certificate.speed_bound)
         return np.array([forward, leftward, upward]), yaw_rate, speed
 
     def _velocity_field(self, max_speed: float) -> VelocityField:
         if self.params.velocity_field == "literal":
             return LiteralField(k=self.params.literal_k)
-        share = self.params.deceleration_share
-        return NormalizedField(
+        forward, leftward, upward = self.bound.tolist()
+        braking = self.params.deceleration_share
+        if self.params.velocity_field == "normalized":
+            return NormalizedField(
+                max_speed_m_s=max_speed,
+                deceleration_m_s2=braking * forward,
+                vertical_deceleration_m_s2=braking * upward,
+                approach_rate_per_s=self.params.approach_rate,
+            )
+        pitch = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
+        return OrientedField(
+            reach_m=float(self.kinematics.reach_and_height(pitch)[0]),
             max_speed_m_s=max_speed,
-            deceleration_m_s2=share * self.bound[0],
-            vertical_deceleration_m_s2=share * self.bound[2],
+            deceleration_m_s2=braking * forward,
+            vertical_deceleration_m_s2=braking * upward,
             approach_rate_per_s=self.params.approach_rate,
+            lateral_acceleration_m_s2=self.params.bound_share * leftward,
+            yaw_rate_rad_s=YAW_SHARE * self.yaw_rate_bound,
+            turn_radius_m=self.params.turn_radius,
         )
 
     def _check_certificate(self) -> None:

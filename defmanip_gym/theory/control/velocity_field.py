@@ -55,8 +55,13 @@ def streamline_heading(x: Numbers, y: Numbers) -> Numbers:
 class VelocityField(Protocol):
     """Desired grasp velocity at each grasp position."""
 
-    def velocity(self, p: Array) -> Array:
-        """Return ż_1d in world axes, (..., 3) m/s, at ``p`` (..., 3) m from the goal."""
+    def velocity(self, p: Array, heading: Array | None = None) -> Array:
+        """Return ż_1d in world axes, (..., 3) m/s, at ``p`` (..., 3) m from the goal.
+
+        Args:
+            p: grasp positions.
+            heading: θ − θ_goal of the robot, (...) rad, for fields that look at it.
+        """
         ...
 
 
@@ -72,7 +77,7 @@ class LiteralField:
     def __post_init__(self) -> None:
         settle(self, "k", require_positive)
 
-    def velocity(self, p: Array) -> Array:
+    def velocity(self, p: Array, heading: Array | None = None) -> Array:
         """Return −k ∇φ(p)."""
         return -self.k * potential_gradient(p)
 
@@ -94,8 +99,8 @@ class NormalizedField:
         for name in self.__dataclass_fields__:
             settle(self, name, require_positive)
 
-    def velocity(self, p: Array) -> Array:
-        """Return the field at p."""
+    def velocity(self, p: Array, heading: Array | None = None) -> Array:
+        """Return the field at p, whatever the heading."""
         distance = np.hypot(p[..., 0], p[..., 1])
         planar = self._speed(distance, self.deceleration_m_s2)[..., None] * dipole_direction(p)
         height = p[..., 2]
