@@ -1,0 +1,83 @@
+"""``defmanip plan``: optima and plans start by start, written as they are found."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from typing import Any
+
+from rich.console import Console
+
+from defmanip_gym.oracle.config import PlanConfig
+from defmanip_gym.planning.limits import NO_MARGINS
+from defmanip_gym.planning.plan import Plan
+from defmanip_gym.planning.problem import require_casadi
+from defmanip_gym.planning.search import coarse_optima, refined
+from defmanip_gym.planning.setting import PlanningSetting
+from defmanip_gym.planning.stored import StoredPlan, StoredPlans
+from defmanip_gym.version import __version__
+
+
+def run_plan(config: PlanConfig) -> StoredPlans:
+    """Plan for every start and return what the file then holds.
+
+    Raises:
+        InstallationError: CasADi is not installed.
+        ParameterError: a start without plan, or an unknown suite.
+        RecordError: the file exists and is no file of plans.
+    """
+    setting, console = PlanningSetting(), Console()
+    plans = _begun(config, setting)
+    starts = config.starts
+    for number, start in enumerate(starts, start=1):
+        if plans.find(start) is not None:
+            continue
+        begun = time.perf_counter()
+        found = planned(setting, start, config)
+        plans = plans.including(found)
+        plans.write(config.output)
+        console.print(
+            f"{number}/{len(starts)}: T* {found.optimum_s:.3f} s ({found.optimal_guess}), "
+            f"to be driven in {found.drive.duration_s:.3f} s; "
+            f"{time.perf_counter() - begun:.1f} s of computing",
+            highlight=False,
+        )
+    return plans
+
+
+def planned(setting: PlanningSetting, start: tuple[float, ...], config: PlanConfig) -> StoredPlan:
+    """Return optimum and driving plan of a start."""
+    model, state, search = setting.model, setting.state_at(start), config.search
+    limits = setting.limits(NO_MARGINS)
+    optima = coarse_optima(model, limits, state, search)
+    optimum = refined(model, limits, state, optima, search)
+    # with margins another of the local optima may be the quickest
+    candidates: list[Plan] = [optimum, *optima[1:]]
+    drive = refined(model, setting.limits(config.margins), state, candidates, search)
+    return StoredPlan(
+        start=start,
+        optimum_s=optimum.duration_s,
+        optimal_guess=optimum.guess,
+        drive=drive,
+    )
+
+
+def made_with(config: PlanConfig, setting: PlanningSetting) -> dict[str, Any]:
+    """Return all that plans depend on, as JSON values."""
+    return {
+        "model": asdict(setting.model),
+        "limits": asdict(setting.limits(NO_MARGINS)),
+        "driving_limits": asdict(setting.limits(config.margins)),
+        "search": asdict(config.search),
+        "casadi": str(require_casadi().__version__),
+        "package": __version__,
+    }
+
+
+def _begun(config: PlanConfig, setting: PlanningSetting) -> StoredPlans:
+    """Return what there is already, if it was made with the same settings."""
+    new = StoredPlans(made_with=made_with(config, setting))
+    if config.fresh or not config.output.exists():
+        return new
+    old = StoredPlans.read(config.output)
+    return old if old.made_with == new.made_with else new
