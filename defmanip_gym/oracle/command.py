@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
 from typing import Any
 
 from rich.console import Console
@@ -13,7 +12,7 @@ from defmanip_gym.planning.limits import NO_MARGINS
 from defmanip_gym.planning.plan import Plan
 from defmanip_gym.planning.problem import require_casadi
 from defmanip_gym.planning.search import coarse_optima, refined
-from defmanip_gym.planning.setting import PlanningSetting
+from defmanip_gym.planning.setting import PlanningSetting, as_json
 from defmanip_gym.planning.stored import StoredPlan, StoredPlans
 from defmanip_gym.version import __version__
 
@@ -64,11 +63,9 @@ def planned(setting: PlanningSetting, start: tuple[float, ...], config: PlanConf
 
 def made_with(config: PlanConfig, setting: PlanningSetting) -> dict[str, Any]:
     """Return all that plans depend on, as JSON values."""
-    return {
-        "model": asdict(setting.model),
-        "limits": asdict(setting.limits(NO_MARGINS)),
-        "driving_limits": asdict(setting.limits(config.margins)),
-        "search": asdict(config.search),
+    return setting.identity | {
+        "driving_limits": as_json(setting.limits(config.margins)),
+        "search": as_json(config.search),
         "casadi": str(require_casadi().__version__),
         "package": __version__,
     }

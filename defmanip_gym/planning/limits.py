@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from defmanip_gym.params import RobotParams, validated_sigma
+from defmanip_gym.planning.drive import DriveLimit
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_number, require_positive, settle
 
-# sides of a triangle of positive area need not be told apart further
+# of an arm folded onto itself
 _ROUNDING_M = 1e-6
 
 
@@ -53,7 +54,7 @@ class PlanLimits:
     """Bounds on a planned motion, m, s and rad; lengths are from the goal where not said otherwise.
 
     Attributes:
-        acceleration_m_s2: |w| on each axis of the base frame.
+        acceleration_m_s2: |w| forward, left and up.
         speed_m_s: of the grasp.
         swing_rad: |φ|.
         storage_swing_rad: V may reach what it is at rest at this swing; None for any V.
@@ -66,10 +67,11 @@ class PlanLimits:
         shoulder_m: height of the shoulder over the goal's grasp.
         shortest_arm_m: shoulder to grasp, where the elbow is as bent as it may be.
         longest_arm_m: where it is as straight as it may be.
+        drive: limit of the drive force; None where it is not looked at.
         effort_weight: on ∫|w|² dt, s³/m².
     """
 
-    acceleration_m_s2: float
+    acceleration_m_s2: tuple[float, float, float]
     speed_m_s: float
     swing_rad: float
     storage_swing_rad: float | None
@@ -82,6 +84,7 @@ class PlanLimits:
     shoulder_m: float
     shortest_arm_m: float
     longest_arm_m: float
+    drive: DriveLimit | None
     effort_weight: float
 
     @staticmethod
@@ -91,6 +94,7 @@ class PlanLimits:
         *,
         sigma_rad: float,
         goal_height_m: float,
+        drive: DriveLimit | None = None,
         margins: Margins = NO_MARGINS,
     ) -> PlanLimits:
         """Return the limits of a task, with margins.
@@ -100,14 +104,16 @@ class PlanLimits:
             robot: lengths of its arm.
             sigma_rad: σ.
             goal_height_m: of the grasp at the goal, from the floor.
+            drive: limit of the drive force, of which no margin is taken.
             margins: shares of all that is used.
         """
         sigma_rad = validated_sigma(sigma_rad)
         goal_height_m = require_positive("goal_height_m", goal_height_m, "m")
         share, storage = margins.tolerance, margins.storage
+        acceleration = margins.acceleration * task.max_acceleration_m_s2
         bend = task.smallest_elbow_bend_rad
         return PlanLimits(
-            acceleration_m_s2=margins.acceleration * task.max_acceleration_m_s2,
+            acceleration_m_s2=(acceleration, acceleration, acceleration),
             speed_m_s=margins.speed * task.max_speed_m_s,
             swing_rad=margins.swing * sigma_rad,
             storage_swing_rad=None
@@ -122,12 +128,9 @@ class PlanLimits:
             shoulder_m=robot.shoulder_height_m - goal_height_m,
             shortest_arm_m=_arm_length(robot, math.pi - bend),
             longest_arm_m=_arm_length(robot, bend),
+            drive=drive,
             effort_weight=margins.effort_weight,
         )
-
-    def described(self) -> dict[str, float | None]:
-        """Return the limits by name, to be stored with plans."""
-        return asdict(self)
 
 
 def _arm_length(robot: RobotParams, bend_rad: float) -> float:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
+from defmanip_gym.theory.dynamics.robot_model import components
 from defmanip_gym.theory.payload.object_model import HangingBeam
 
 Array = NDArray[np.float64]
@@ -166,5 +167,5 @@ def advanced(
 
 def advanced_rows(model: TransportModel, states: Array, w: Array, time_s: Array | float) -> Array:
     """Return states (..., 11) after times (...) under commands (..., 3)."""
-    columns = advanced(model, np.moveaxis(states, -1, 0), np.moveaxis(w, -1, 0), time_s)
+    columns = advanced(model, components(states), components(w), time_s)
     return np.stack(columns, axis=-1)

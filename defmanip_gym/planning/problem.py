@@ -24,6 +24,7 @@ from defmanip_gym.planning.model import (
     Array,
     TransportModel,
     advanced,
+    state_rates,
 )
 from defmanip_gym.planning.plan import Plan
 from defmanip_gym.validation import require_whole
@@ -67,7 +68,8 @@ class TransportProblem:
             following = advanced(model, state, w, interval, casadi.sin, casadi.cos)
             rows.append(states[:, k + 1] - casadi.vertcat(*following))
         equalities = casadi.vertcat(*rows)
-        kept = [
+        kept = self._pulled(casadi, states, commands)
+        kept += [
             entry for k in range(1, intervals + 1) for entry in self._kept(casadi, states[:, k])
         ]
         kept += self._tolerances(states[:, intervals])
@@ -136,6 +138,19 @@ class TransportProblem:
             kept.append(model.storage(swing, rate, casadi.cos) - highest)
         return kept
 
+    def _pulled(self, casadi: Any, states: Any, commands: Any) -> list[Any]:
+        """Return what is at most zero in every interval, of the drive force."""
+        drive = self.limits.drive
+        if drive is None:
+            return []
+        pulled = []
+        for k in range(self.intervals):
+            state, w = casadi.vertsplit(states[:, k]), casadi.vertsplit(commands[:, k])
+            rates = state_rates(self.model, state, w, casadi.sin, casadi.cos)
+            force = drive.force(state, rates, w[0], casadi.sin, casadi.cos)
+            pulled.append((force / drive.force_n) ** 2 - 1)
+        return pulled
+
     def _tolerances(self, state: Any) -> list[Any]:
         """Return what is at most zero at the end."""
         limits = self.limits
@@ -151,7 +166,7 @@ class TransportProblem:
         limits = self.limits
         state = np.full(STATE_SIZE, np.inf)
         state[SWING] = limits.swing_rad
-        command = np.full(COMMAND_SIZE, limits.acceleration_m_s2)
+        command = np.array(limits.acceleration_m_s2)
         last = state.copy()
         last[HEADING], last[SWING] = limits.heading_tolerance_rad, limits.swing_tolerance_rad
         motion = np.tile(np.concatenate((state, command)), self.intervals)

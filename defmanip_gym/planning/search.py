@@ -88,7 +88,7 @@ def best_plan(
     model: TransportModel,
     limits: PlanLimits,
     state: Array,
-    params: SearchParams = SearchParams(),  # noqa: B008  frozen
+    params: SearchParams = SearchParams(),
 ) -> Plan:
     """Return the quickest plan found from a state, (11,).
 

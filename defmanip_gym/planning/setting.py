@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from defmanip_gym.params import BeamParams, RobotParams, validated_sigma
+from defmanip_gym.planning.drive import DriveLimit
 from defmanip_gym.planning.limits import NO_MARGINS, Margins, PlanLimits
 from defmanip_gym.planning.model import HEADING, REACH, STATE_SIZE, SWING, Array, TransportModel
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_finite_sequence, require_params, settle
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,13 +61,22 @@ class PlanningSetting:
 
     def limits(self, margins: Margins = NO_MARGINS) -> PlanLimits:
         """Return what motions keep to."""
+        goal_pitch = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
         return PlanLimits.of(
             self.task,
             self.robot,
             sigma_rad=self.sigma_rad,
             goal_height_m=self.goal_reach_and_height_m[1],
+            drive=DriveLimit.of(
+                self.robot, self.beam, JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
+            ),
             margins=margins,
         )
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What optimal times depend on, as JSON values."""
+        return {"model": as_json(self.model), "limits": as_json(self.limits())}
 
     def state_at(self, start: Sequence[float]) -> Array:
         """Return the state (11,) at rest at a start (x, y, θ, q1, q2, φ), m and rad."""
@@ -84,3 +99,9 @@ class PlanningSetting:
         pitch = JOINT_TO_PITCH @ np.array(pose[3:5])
         reach, height = ArmKinematics(self.robot).reach_and_height(pitch).tolist()
         return reach, height
+
+
+def as_json(params: DataclassInstance) -> dict[str, Any]:
+    """Return a dataclass as the values that JSON makes of it."""
+    values: dict[str, Any] = json.loads(json.dumps(asdict(params)))
+    return values

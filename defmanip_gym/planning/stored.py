@@ -6,12 +6,13 @@ the model leaves out and makes the file small.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -59,13 +60,22 @@ class StoredPlans:
     made_with: Mapping[str, Any]
     plans: tuple[StoredPlan, ...] = ()
 
-    def find(self, start: Sequence[float]) -> StoredPlan | None:
-        """Return what is known of a start (x, y, θ, q1, q2, φ); None where nothing is."""
+    def find(
+        self, start: Sequence[float] | Array, *, swing_tolerance_rad: float = _ALIKE
+    ) -> StoredPlan | None:
+        """Return what is known of a start (x, y, θ, q1, q2, φ); None where nothing is.
+
+        Args:
+            start: m and rad; the heading may have any number of turns.
+            swing_tolerance_rad: by how much the swing, which noisy sensors tell, may differ.
+        """
         if not self.plans:
             return None
-        away = np.abs(self._starts() - np.asarray(start)).max(axis=1)
-        nearest = int(np.argmin(away))
-        return self.plans[nearest] if away[nearest] < _ALIKE else None
+        away = np.abs(self._starts - np.asarray(start))
+        away[:, 2] = np.abs(np.remainder(away[:, 2] + np.pi, 2 * np.pi) - np.pi)
+        away[:, 5] *= _ALIKE / swing_tolerance_rad
+        nearest = int(np.argmin(away.max(axis=1)))
+        return self.plans[nearest] if away[nearest].max() < _ALIKE else None
 
     def including(self, plan: StoredPlan) -> StoredPlans:
         """Return these and one more, in place of an old one of the same start."""
@@ -83,7 +93,7 @@ class StoredPlans:
         np.savez_compressed(
             buffer,
             made_with=np.array(json.dumps(self.made_with, sort_keys=True)),
-            starts=self._starts(),
+            starts=self._starts,
             optima_s=np.array([plan.optimum_s for plan in self.plans]).round(5),
             optimal_guesses=np.array([plan.optimal_guess for plan in self.plans]),
             durations_s=np.array([drive.duration_s for drive in drives]).round(5),
@@ -102,11 +112,21 @@ class StoredPlans:
         try:
             with np.load(path, allow_pickle=False) as arrays:
                 return _unpacked({key: arrays[key] for key in _KEYS})
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
             raise RecordError(
                 f"plans in {path}", str(error), "a file that `defmanip plan` wrote", _REMEDY
             ) from error
 
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the plans."""
+        content = hashlib.sha256()
+        for plan in self.plans:
+            content.update(np.array([*plan.start, plan.optimum_s, plan.drive.duration_s]).tobytes())
+            content.update(plan.drive.states.tobytes() + plan.drive.commands.tobytes())
+        return content.hexdigest()
+
+    @cached_property
     def _starts(self) -> Array:
         return np.array([plan.start for plan in self.plans]).reshape(-1, 6)
 

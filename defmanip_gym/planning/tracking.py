@@ -88,9 +88,7 @@ class Track:
     gains: Array
 
 
-def track_of(
-    model: TransportModel, plan: Plan, period_s: float, weights: TrackingWeights
-) -> Track:
+def track_of(model: TransportModel, plan: Plan, period_s: float, weights: TrackingWeights) -> Track:
     """Return what following a plan in samples takes."""
     states, commands = plan.sampled(model, period_s)
     A, B = linearized(model, states[:-1], commands, period_s)

@@ -23,7 +23,16 @@ def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
     """Return a table that fits into 120 columns."""
     table = Table(box=box.SIMPLE_HEAD, title=f"Suite {suite}", title_justify="left")
     table.add_column("Contestant", no_wrap=True, style="bold")
-    headings = ("Score IQM", "Success %", "Violation %", "Swing/σ", "Time s", "Interv. %", "ms")
+    headings = (
+        "Score IQM",
+        "T*/T",
+        "Success %",
+        "Violation %",
+        "Swing/σ",
+        "Time s",
+        "Interv. %",
+        "ms",
+    )
     for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
@@ -33,6 +42,7 @@ def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
         table.add_row(
             summary.contestant,
             _on_one_line(estimate_cell(summary.score["iqm"], 2)),
+            estimate_cell(summary.optimum_share, 2).value,
             _on_one_line(rate_cell(summary.success)),
             _on_one_line(rate_cell(summary.violation)),
             f"{largest:.2f} ({tail:.2f})",
