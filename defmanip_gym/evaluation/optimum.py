@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.suites import Start
-from defmanip_gym.planning.stored import shipped_plans
+from defmanip_gym.planning.plan_file import shipped_plans
 
 
 def optimum_s(start: Start) -> float | None:

@@ -10,6 +10,7 @@ from rich.console import Console
 from defmanip_gym.oracle.config import PlanConfig
 from defmanip_gym.planning.limits import NO_MARGINS
 from defmanip_gym.planning.plan import Plan
+from defmanip_gym.planning.plan_file import read_plans, write_plans
 from defmanip_gym.planning.problem import require_casadi
 from defmanip_gym.planning.search import coarse_optima, refined
 from defmanip_gym.planning.setting import PlanningSetting, as_json
@@ -34,7 +35,7 @@ def run_plan(config: PlanConfig) -> StoredPlans:
         begun = time.perf_counter()
         found = planned(setting, start, config)
         plans = plans.including(found)
-        plans.write(config.output)
+        write_plans(config.output, plans)
         console.print(
             f"{number}/{len(starts)}: T* {found.optimum_s:.3f} s ({found.optimal_guess}), "
             f"to be driven in {found.drive.duration_s:.3f} s; "
@@ -76,5 +77,5 @@ def _begun(config: PlanConfig, setting: PlanningSetting) -> StoredPlans:
     new = StoredPlans(made_with=made_with(config, setting))
     if config.fresh or not config.output.exists():
         return new
-    old = StoredPlans.read(config.output)
+    old = read_plans(config.output)
     return old if old.made_with == new.made_with else new

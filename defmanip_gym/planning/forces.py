@@ -54,8 +54,8 @@ def force_shares(setting: PlanningSetting, plan: Plan) -> Array:
     )
     forces = loop.generalized_forces(
         plan.commands,
-        pitch @ PITCH_TO_JOINT.T,
-        pitch_rate @ PITCH_TO_JOINT.T,
+        np.asarray(pitch @ PITCH_TO_JOINT.T, dtype=np.float64),
+        np.asarray(pitch_rate @ PITCH_TO_JOINT.T, dtype=np.float64),
         base,
         states[:, SWING : SWING + 1],
         states[:, SWING_RATE:],

@@ -14,17 +14,20 @@ from typing import Any
 import numpy as np
 
 from defmanip_gym.errors import InstallationError
+from defmanip_gym.planning.constraints import (
+    kept_at_nodes,
+    kept_at_the_end,
+    kept_in_intervals,
+)
 from defmanip_gym.planning.limits import PlanLimits
 from defmanip_gym.planning.model import (
     COMMAND_SIZE,
     HEADING,
     STATE_SIZE,
     SWING,
-    VELOCITY,
     Array,
     TransportModel,
     advanced,
-    state_rates,
 )
 from defmanip_gym.planning.plan import Plan
 from defmanip_gym.validation import require_whole
@@ -68,11 +71,10 @@ class TransportProblem:
             following = advanced(model, state, w, interval, casadi.sin, casadi.cos)
             rows.append(states[:, k + 1] - casadi.vertcat(*following))
         equalities = casadi.vertcat(*rows)
-        kept = self._pulled(casadi, states, commands)
-        kept += [
-            entry for k in range(1, intervals + 1) for entry in self._kept(casadi, states[:, k])
-        ]
-        kept += self._tolerances(states[:, intervals])
+        kept = kept_in_intervals(casadi, model, limits, states, commands)
+        for k in range(1, intervals + 1):
+            kept += kept_at_nodes(casadi, model, limits, states[:, k])
+        kept += kept_at_the_end(limits, states[:, intervals])
         inequalities = casadi.vertcat(*kept)
         effort = limits.effort_weight * interval * casadi.sumsqr(commands)
         motion = casadi.vec(casadi.vertcat(states[:, :intervals], commands))
@@ -119,47 +121,6 @@ class TransportProblem:
             commands=rows[:, STATE_SIZE:],
             guess=guess.guess,
         )
-
-    def _kept(self, casadi: Any, state: Any) -> list[Any]:
-        """Return what is at most zero at every node but the first."""
-        limits, model = self.limits, self.model
-        x, y, z, heading, forward, left, up, reach, _, swing, rate = casadi.vertsplit(state)
-        arm = reach**2 + (z - limits.shoulder_m) ** 2
-        base_x = x + model.goal_reach_m - reach * casadi.cos(heading)
-        base_y = y - reach * casadi.sin(heading)
-        kept = [
-            forward**2 + left**2 + up**2 - limits.speed_m_s**2,
-            arm - limits.longest_arm_m**2,
-            limits.shortest_arm_m**2 - arm,
-            base_x**2 + base_y**2 - limits.arena_radius_m**2,
-        ]
-        if limits.storage_swing_rad is not None:
-            highest = float(model.storage(limits.storage_swing_rad, 0.0))
-            kept.append(model.storage(swing, rate, casadi.cos) - highest)
-        return kept
-
-    def _pulled(self, casadi: Any, states: Any, commands: Any) -> list[Any]:
-        """Return what is at most zero in every interval, of the drive force."""
-        drive = self.limits.drive
-        if drive is None:
-            return []
-        pulled = []
-        for k in range(self.intervals):
-            state, w = casadi.vertsplit(states[:, k]), casadi.vertsplit(commands[:, k])
-            rates = state_rates(self.model, state, w, casadi.sin, casadi.cos)
-            force = drive.force(state, rates, w[0], casadi.sin, casadi.cos)
-            pulled.append((force / drive.force_n) ** 2 - 1)
-        return pulled
-
-    def _tolerances(self, state: Any) -> list[Any]:
-        """Return what is at most zero at the end."""
-        limits = self.limits
-        position = sum(state[k] ** 2 for k in range(3))
-        speed = sum(state[k] ** 2 for k in range(VELOCITY.start, VELOCITY.stop))
-        return [
-            position - limits.position_tolerance_m**2,
-            speed - limits.speed_tolerance_m_s**2,
-        ]
 
     def _bounds(self) -> tuple[Array, Array]:
         """Return the bounds on all unknowns for a goal heading of no turn."""

@@ -67,9 +67,7 @@ class PlanningSetting:
             self.robot,
             sigma_rad=self.sigma_rad,
             goal_height_m=self.goal_reach_and_height_m[1],
-            drive=DriveLimit.of(
-                self.robot, self.beam, JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
-            ),
+            drive=DriveLimit.of(self.robot, self.beam, goal_pitch),
             margins=margins,
         )
 

@@ -62,7 +62,7 @@ def shortest_time_of_linear_programs(distance_m, limits, period_s=0.02):
                 tolerances - aim,
             )
         )
-        bound = (-limits.acceleration_m_s2, limits.acceleration_m_s2)
+        bound = (-limits.acceleration_m_s2[0], limits.acceleration_m_s2[0])
         found = linprog(np.zeros(count), upper, most, bounds=[bound] * count, method="highs")
         return found.status == 0
 

@@ -10,10 +10,10 @@ import pytest
 
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.suites import SUITES
-from defmanip_gym.planning.model import advanced_rows
+from defmanip_gym.planning.model import HEADING, SWING, advanced_rows
+from defmanip_gym.planning.plan_file import read_plans, shipped_plans, write_plans
 from defmanip_gym.planning.search import best_plan
 from defmanip_gym.planning.setting import PlanningSetting
-from defmanip_gym.planning.stored import StoredPlans, shipped_plans
 
 SETTING = PlanningSetting()
 LARGEST_FILE = 1_000_000
@@ -63,21 +63,26 @@ def some(count=3):
 
 def test_a_file_gives_back_what_was_written(tmp_path):
     path, plans = tmp_path / "plans.npz", some()
-    plans.write(path)
-    again = StoredPlans.read(path)
+    write_plans(path, plans)
+    again = read_plans(path)
     assert again.digest == plans.digest
     assert again.made_with == plans.made_with
     assert [plan.drive.guess for plan in again.plans] == [plan.drive.guess for plan in plans.plans]
 
 
-def test_starts_are_found_whatever_turn_their_heading_is_on_and_only_close_by():
+def test_starts_are_found_exactly_and_states_whatever_turn_their_heading_is_on():
     plans = some()
-    x, y, heading, *arm, swing = plans.plans[1].start
-    assert plans.find((x, y, heading + math.tau, *arm, swing)) is plans.plans[1]
-    assert plans.find((x + 1e-3, y, heading, *arm, swing)) is None
-    noisy = (x, y, heading, *arm, swing + 0.1)
-    assert plans.find(noisy) is None
-    assert plans.find(noisy, swing_tolerance_rad=0.2) is plans.plans[1]
+    sought = plans.plans[1]
+    x, *rest = sought.start
+    assert plans.find(sought.start) is sought
+    assert plans.find((x + 1e-3, *rest)) is None
+    state = SETTING.state_at(sought.start)
+    state[HEADING] += math.tau
+    state[SWING] += 0.1
+    assert plans.find_state(state, swing_tolerance_rad=0.01) is None
+    assert plans.find_state(state, swing_tolerance_rad=0.2) is sought
+    state[0] += 0.01
+    assert plans.find_state(state, swing_tolerance_rad=0.2) is None
 
 
 def test_a_new_plan_takes_the_place_of_the_old_one():
@@ -92,9 +97,9 @@ def test_files_of_others_are_refused(tmp_path, content):
     path = tmp_path / "plans.npz"
     path.write_bytes(content)
     with pytest.raises(RecordError, match="defmanip plan"):
-        StoredPlans.read(path)
+        read_plans(path)
 
 
 def test_the_file_is_small(tmp_path):
-    shipped_plans().write(tmp_path / "plans.npz")
+    write_plans(tmp_path / "plans.npz", shipped_plans())
     assert (tmp_path / "plans.npz").stat().st_size < LARGEST_FILE

@@ -7,8 +7,8 @@ import pytest
 
 from defmanip_gym.planning.model import HEADING, REACH, advanced_rows
 from defmanip_gym.planning.plan import Plan
+from defmanip_gym.planning.plan_file import shipped_plans
 from defmanip_gym.planning.setting import PlanningSetting
-from defmanip_gym.planning.stored import shipped_plans
 from defmanip_gym.planning.tracking import TrackingWeights, holding_gain, linearized, track_of
 
 SETTING = PlanningSetting()
