@@ -34,8 +34,9 @@ def controller_contestant(
     if certificate is not None:
         description += f": grasp acceleration within {certificate.acceleration_bound:.2g} m/s²"
     made = Made(reference, certificate if base in _BOUNDED else None)
-    made.build(())  # one that cannot be made shows before anything runs
+    controller = made.build(())  # one that cannot be made shows before anything runs
     knows = "what its maker gave it" if is_reference(base) else "nominal robot and beam"
+    knows = getattr(controller, "knows", knows)
     return Contestant(
         name=f"{base}/{method}" if method else base,
         family="guest" if is_reference(base) else "analytic",

@@ -7,7 +7,9 @@ from typing import Any
 
 from rich.console import Console
 
+from defmanip_gym.files import write_atomically
 from defmanip_gym.oracle.config import PlanConfig
+from defmanip_gym.oracle.page import optimum_page
 from defmanip_gym.planning.limits import NO_MARGINS
 from defmanip_gym.planning.plan import Plan
 from defmanip_gym.planning.plan_file import read_plans, write_plans
@@ -42,6 +44,8 @@ def run_plan(config: PlanConfig) -> StoredPlans:
             f"{time.perf_counter() - begun:.1f} s of computing",
             highlight=False,
         )
+    if config.page is not None:
+        write_atomically(config.page, optimum_page(plans, config.chosen).encode())
     return plans
 
 

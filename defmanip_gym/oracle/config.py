@@ -32,6 +32,8 @@ class PlanConfig:
     """How thoroughly is searched."""
     fresh: bool = False
     """Plan everything anew."""
+    page: Path | None = None
+    """Markdown page of all optima, with what following the plans takes on the plant."""
 
     @property
     def chosen(self) -> tuple[Suite, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -42,3 +43,13 @@ def test_starts_are_planned_for_once():
     config = PlanConfig(output=None)
     scenarios = [s for suite in config.chosen for s in suite.scenarios]
     assert len(config.starts) == len({s.start for s in scenarios}) == len(shipped_plans().plans)
+
+
+def test_the_page_tells_of_every_scenario_and_condition(config):
+    page = command.optimum_page(run_plan(config), config.chosen)
+    for scenario in suite_named("paper").scenarios:
+        assert f"`{scenario.condition.name}` | 1 |" in page
+        (line,) = re.findall(rf"\| paper \| `{scenario.name}` \| (.*) \|", page)
+        optimum, share, outcome = line.split(" | ")
+        assert 5.5 < float(optimum) < 5.7 and 1.0 < float(share) < 1.3
+        assert outcome == "success"

@@ -48,9 +48,14 @@ class TimeOptimalController:
         plans: that are known beforehand; those of the package by default, where they were made for
             this robot, beam and task.
 
+    Attributes:
+        knows: what comparisons say that it knows beyond the observation.
+
     Raises:
         ParameterError: the beam has several segments.
     """
+
+    knows = "nominal robot and beam; plans made beforehand for the suites' starts"
 
     def __init__(
         self,
