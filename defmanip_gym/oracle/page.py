@@ -87,10 +87,10 @@ def _number(value: float) -> str:
 _HEAD = (
     "# The optimum, and driving it",
     "",
-    "Made by `defmanip plan --output FILE --page docs/optimum.md`. T* is the time-optimal time from",
-    "a start ([derivations.md](derivations.md), section 21), without margins, of the nominal model,",
-    "whatever the condition. T is what `time_optimal` takes inside the storage filter on the plant",
-    "of the condition, following plans with margins. A dash is no success.",
+    "Made by `defmanip plan --output FILE --page docs/optimum.md`. T* is the time-optimal time",
+    "from a start ([derivations.md](derivations.md), section 21), without margins, of the nominal",
+    "model, whatever the condition. T is what `time_optimal` takes inside the storage filter on",
+    "the plant of the condition, following plans with margins. A dash is no success.",
     "",
     "| suite | condition | starts | T* in s, median (range) | success | violations | T/T* median "
     "| largest | swing max/σ |",

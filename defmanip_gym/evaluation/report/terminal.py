@@ -21,19 +21,16 @@ from defmanip_gym.evaluation.statistics.intervals import Rate
 
 def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
     """Return a table that fits into 120 columns."""
-    table = Table(box=box.SIMPLE_HEAD, title=f"Suite {suite}", title_justify="left")
-    table.add_column("Contestant", no_wrap=True, style="bold")
-    headings = (
-        "Score IQM",
-        "T*/T",
-        "Success %",
-        "Violation %",
-        "Swing/σ",
-        "Time s",
-        "Interv. %",
-        "ms",
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        title=f"Suite {suite}",
+        title_justify="left",
+        pad_edge=False,
+        collapse_padding=True,
     )
-    for heading in headings:
+    table.add_column("Contestant", no_wrap=True, style="bold")
+    rates = ("Success %", "Violation %", "Swing/σ", "Time s", "Interv. %")
+    for heading in ("Score IQM", "T*/T", *rates, "ms"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
         summary, decision = row.summary, row.decision_time_s
