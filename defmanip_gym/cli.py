@@ -16,6 +16,7 @@ from defmanip_gym.catalogue.config import AgentsConfig
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.errors import DefmanipError, InstallationError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
+from defmanip_gym.oracle.config import PlanConfig
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.ship_config import ShipConfig
@@ -33,6 +34,7 @@ def main() -> None:
         "certify": CertifyConfig,
         "reproduce": ReproductionConfig,
         "agents": AgentsConfig,
+        "plan": PlanConfig,
         "ship": ShipConfig,
     }
     _guarded(
@@ -78,6 +80,11 @@ def _run(config: object) -> None:
         from defmanip_gym.catalogue.command import run_agents
 
         run_agents(config)
+
+    elif isinstance(config, PlanConfig):
+        from defmanip_gym.oracle.command import run_plan
+
+        run_plan(config)
 
 
 def _run_training(config: TrainConfig | TuneConfig | ShipConfig) -> None:

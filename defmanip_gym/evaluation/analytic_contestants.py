@@ -37,6 +37,7 @@ def controller_contestant(
         description += f": grasp acceleration within {certificate.acceleration_bound:.2g} m/s²"
     made = Made(reference, certificate if base in _BOUNDED else None)
     knows = "what its maker gave it" if is_reference(base) else "nominal robot and beam"
+    knows = getattr(alone, "knows", knows)
     return Contestant(
         name=f"{base}/{method}" if method else base,
         family="guest" if is_reference(base) else "analytic",

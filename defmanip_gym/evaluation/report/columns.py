@@ -109,6 +109,13 @@ COLUMNS: tuple[Column[Row], ...] = (
         cell=lambda row: estimate_cell(row.summary.score["iqm"], 3),
     ),
     Column(
+        heading="T*/T",
+        unit="IQM",
+        legend="the time-optimal time from the very start over the time taken, 0 for an episode "
+        "that does not succeed; T* is the nominal model's; interquartile mean over episodes",
+        cell=lambda row: estimate_cell(row.summary.optimum_share, 3),
+    ),
+    Column(
         heading="Success",
         unit="%",
         legend="share of episodes that reached the goal without ever exceeding σ",

@@ -161,6 +161,7 @@ def _csv_row(suite: str, row: Row) -> dict[str, str | float | int | None]:
     values |= {f"outcome_{outcome}": count for outcome, count in summary.outcomes.items()}
     values["largest_swing_share"] = summary.largest_swing_share
     estimates = {
+        "optimum_share_iqm": summary.optimum_share,
         "swing_share_cvar": summary.swing_share_cvar,
         "time_to_goal_iqm_s": summary.time_to_goal_s,
         "path_length_iqm_m": summary.path_length_m,

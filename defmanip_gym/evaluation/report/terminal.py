@@ -21,10 +21,16 @@ from defmanip_gym.evaluation.statistics.intervals import Rate
 
 def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
     """Return a table that fits into 120 columns."""
-    table = Table(box=box.SIMPLE_HEAD, title=f"Suite {suite}", title_justify="left")
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        title=f"Suite {suite}",
+        title_justify="left",
+        pad_edge=False,
+        collapse_padding=True,
+    )
     table.add_column("Contestant", no_wrap=True, style="bold")
-    headings = ("Score IQM", "Success %", "Violation %", "Swing/σ", "Time s", "Interv. %", "ms")
-    for heading in headings:
+    rates = ("Success %", "Violation %", "Swing/σ", "Time s", "Interv. %")
+    for heading in ("Score IQM", "T*/T", *rates, "ms"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
         summary, decision = row.summary, row.decision_time_s
@@ -33,6 +39,7 @@ def terminal_table(suite: str, rows: Sequence[Row]) -> Table:
         table.add_row(
             summary.contestant,
             _on_one_line(estimate_cell(summary.score["iqm"], 2)),
+            estimate_cell(summary.optimum_share, 2).value,
             _on_one_line(rate_cell(summary.success)),
             _on_one_line(rate_cell(summary.violation)),
             f"{largest:.2f} ({tail:.2f})",

@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 
 from defmanip_gym.evaluation.entry import Family
+from defmanip_gym.evaluation.optimum import optimum_share
 from defmanip_gym.evaluation.records import EpisodeRecord, Outcome
 from defmanip_gym.evaluation.statistics.aggregates import (
     SCORE_AGGREGATES,
@@ -48,6 +49,7 @@ class Summary:
         family: what kind of controller it is.
         members: how many.
         score: aggregates by name, as in ``SCORE_AGGREGATES``, with the intervals of ``Scores``.
+        optimum_share: T*/T, 0 without success; interquartile mean; None where T* is not known.
         score_iqm_retrained: interval of the interquartile mean over retraining on these very
             scenarios (stratified bootstrap); None for one member.
         success: goal reached and σ never exceeded.
@@ -71,6 +73,7 @@ class Summary:
     family: Family
     members: int
     score: Mapping[str, Estimate]
+    optimum_share: Estimate | None
     score_iqm_retrained: Interval | None
     success: Rate
     violation: Rate
@@ -99,6 +102,7 @@ def summarize(bootstrap: CrossedBootstrap, scores: Scores) -> Summary:
         family=table.family,
         members=len(table.members),
         score={name: scores.estimate(name) for name in SCORE_AGGREGATES},
+        optimum_share=_known(bootstrap, table, optimum_share),
         score_iqm_retrained=_retrained(bootstrap, table),
         success=success_rate(bootstrap, table),
         violation=_rate(bootstrap, table, table.values(lambda record: record.violated)),
@@ -157,7 +161,12 @@ def _of_successes(
     def only_successes(record: EpisodeRecord) -> float | None:
         return reading(record) if record.success else None
 
-    values = table.values(only_successes)
+    return _known(bootstrap, table, only_successes)
+
+
+def _known(bootstrap: CrossedBootstrap, table: EpisodeTable, reading: Reading) -> Estimate | None:
+    """Return an interquartile mean over the episodes that have a value, None without any."""
+    values = table.values(reading)
     if not np.isfinite(values).any():
         return None
     return _estimate(bootstrap, table, values, interquartile_mean)

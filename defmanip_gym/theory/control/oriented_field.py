@@ -1,6 +1,6 @@
 """A velocity field whose streamlines all reach the goal along +x, by short ways.
 
-Derivation: docs/derivations.md, section 21.
+Derivation: docs/derivations.md, section 22.
 """
 
 from __future__ import annotations

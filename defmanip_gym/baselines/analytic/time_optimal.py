@@ -1,0 +1,169 @@
+"""Plans the quickest motion from where an episode begins, and follows it.
+
+The plan is the optimal control problem's answer with margins (``planning``), taken from the stored
+ones where the start is known, which is planning offline, and solved for where it is not. It is
+followed by linear-quadratic regulation about it, and held at the goal by the same law.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defmanip_gym.baselines.analytic.planner_state import planner_states
+from defmanip_gym.baselines.analytic.time_optimal_params import TimeOptimalParams
+from defmanip_gym.baselines.controller import State
+from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.planning.model import HEADING, Array
+from defmanip_gym.planning.setting import PlanningSetting
+from defmanip_gym.planning.stored import StoredPlans
+from defmanip_gym.planning.tracking import holding_gain
+from defmanip_gym.planning.tracks import Tracks, fitting_plans
+from defmanip_gym.task_params import TaskParams
+from defmanip_gym.theory.dynamics.frames import world_to_base
+from defmanip_gym.theory.dynamics.robot_model import ArmKinematics
+from defmanip_gym.validation import require_params
+
+BoolArray = NDArray[np.bool_]
+
+
+class TimeOptimalController:
+    """Plans at the beginning of each episode, then follows.
+
+    Its state holds where each episode's plan begins, (n, 11), and how many samples ago, (n,). Plans
+    and gains follow from that alone, and are made once for each.
+
+    Args:
+        beam: the object as the controller knows it, a rigid rod.
+        robot: the robot as the controller knows it.
+        task: goal, limits and control period.
+        sigma_rad: σ.
+        params: design choices.
+        plans: that are known beforehand; those of the package by default, where they were made for
+            this robot, beam and task.
+
+    Attributes:
+        knows: what comparisons say that it knows beyond the observation.
+
+    Raises:
+        ParameterError: the beam has several segments.
+    """
+
+    knows = "nominal robot and beam; plans made beforehand for the suites' starts"
+
+    def __init__(
+        self,
+        *,
+        beam: BeamParams | None = None,
+        robot: RobotParams | None = None,
+        task: TaskParams | None = None,
+        sigma_rad: float = math.pi / 6,
+        params: TimeOptimalParams | None = None,
+        plans: StoredPlans | None = None,
+    ) -> None:
+        self.setting = PlanningSetting(
+            beam=BeamParams() if beam is None else beam,
+            robot=RobotParams() if robot is None else robot,
+            task=TaskParams() if task is None else task,
+            sigma_rad=sigma_rad,
+        )
+        params = TimeOptimalParams() if params is None else params
+        self.params = require_params("params", params, TimeOptimalParams)
+        self.tracks = Tracks(
+            setting=self.setting,
+            stored=fitting_plans(self.setting) if plans is None else plans,
+            margins=params.margins,
+            search=params.search,
+            weights=params.weights,
+        )
+        self.layout = ObservationLayout(1)
+        self.kinematics = ArmKinematics(self.setting.robot)
+        period_s = self.setting.task.control_period_s
+        self._hold = holding_gain(self.setting.model, period_s, self.params.weights)
+
+    def predict(
+        self,
+        observation: Array,
+        state: State | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[Array, State | None]:
+        """Return w / a_max and (where plans begin, samples since then).
+
+        Raises:
+            InstallationError: a start that no stored plan is for, and CasADi is not installed.
+            ParameterError: a start without plan.
+        """
+        states = planner_states(np.atleast_2d(observation), self.layout, self.kinematics)
+        origins, steps = states, np.zeros(len(states), dtype=np.int64)
+        if state is not None:
+            goes_on = np.ones(len(states), dtype=bool)
+            if episode_start is not None:
+                goes_on = ~np.atleast_1d(episode_start)
+            origins = np.where(goes_on[:, None], state[0], states)
+            steps = np.where(goes_on, state[1], 0)
+        if self.params.replans:
+            lost = self._lost(states, origins, steps)
+            origins = np.where(lost[:, None], states, origins)
+            steps = np.where(lost, 0, steps)
+        w = self._commands(states, origins, steps)
+        action = np.clip(w / self.setting.task.max_acceleration_m_s2, -1.0, 1.0)
+        return action.reshape(*np.shape(observation)[:-1], 3), (origins, steps + 1)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What its behaviour depends on, as JSON values."""
+        return {
+            "setting": asdict(self.setting),
+            "params": asdict(self.params),
+            "plans": self.tracks.stored.digest,
+        }
+
+    def _commands(self, states: Array, origins: Array, steps: NDArray[np.int64]) -> Array:
+        """Return w, (n, 3) m/s²: the plan's with feedback, and beyond its end the holding one."""
+        w = np.empty((len(states), 3))
+        for row, step in enumerate(steps.tolist()):
+            now, track = states[row], self.tracks.of(origins[row])
+            if step < len(track.commands):
+                error = _deviation(now, track.states[step])
+                w[row] = track.commands[step] - track.gains[step] @ error
+            else:
+                error = now.copy()
+                error[:3] = world_to_base(now[:3], now[HEADING])
+                w[row] = -self._hold @ error
+        return w
+
+    def _lost(self, states: Array, origins: Array, steps: NDArray[np.int64]) -> BoolArray:
+        """Return which episodes are far off their plan, or have not ended long after it, (n,)."""
+        lost = np.empty(len(states), dtype=np.bool_)
+        patience = self.params.patience_s / self.setting.task.control_period_s
+        for row, step in enumerate(steps.tolist()):
+            track = self.tracks.of(origins[row])
+            if step < len(track.commands):
+                away = _deviation(states[row], track.states[step])[:3]
+                lost[row] = np.linalg.norm(away) > self.params.lost_m
+            else:
+                lost[row] = step - len(track.commands) > patience
+        return lost
+
+
+def make_controller(config: TransportConfig) -> TimeOptimalController:
+    """Plans the quickest motion from the start, with margins, and follows it by LQR."""
+    return TimeOptimalController(
+        beam=config.beam,
+        robot=config.believed_robot,
+        task=config.task,
+        sigma_rad=config.sigma_rad,
+    )
+
+
+def _deviation(now: Array, planned: Array) -> Array:
+    error = now - planned
+    error[HEADING] = math.remainder(error[HEADING], math.tau)
+    return error
