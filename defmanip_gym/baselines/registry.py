@@ -16,7 +16,7 @@ from typing import Any, Protocol, cast, get_args
 
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
-from defmanip_gym.errors import ControllerError
+from defmanip_gym.errors import ControllerError, InstallationError
 from defmanip_gym.theory.certificates import Certificate
 
 CONTROLLER_GROUP = "defmanip_gym.controllers"  # of entry points
@@ -56,6 +56,11 @@ def registered_controllers() -> dict[str, str]:
         for point in package.entry_points.select(group=CONTROLLER_GROUP)
     }
     return dict(sorted(found.items()))
+
+
+def available_controllers() -> dict[str, str]:
+    """Return those that can be made with the packages that are installed."""
+    return {name: each for name, each in registered_controllers().items() if _can_be_made(each)}
 
 
 def is_reference(name: str) -> bool:
@@ -155,6 +160,14 @@ def _digest(package: str) -> str:
     for path in files:
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
+
+
+def _can_be_made(reference: str) -> bool:
+    try:
+        make_controller(reference, TransportConfig())
+    except InstallationError:
+        return False
+    return True
 
 
 def _see_working_directory() -> None:

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from defmanip_gym.baselines.learned.agents import load_family, shipped_families
-from defmanip_gym.baselines.registry import is_reference, registered_controllers
+from defmanip_gym.baselines.registry import (
+    available_controllers,
+    is_reference,
+    registered_controllers,
+)
 from defmanip_gym.evaluation.analytic_contestants import controller_contestant
 from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Random, Zero
@@ -22,8 +26,11 @@ _PAPERS_OPTIONS = (*STORAGE_FILTERS, *CERTIFICATES)
 
 
 def standard_names() -> tuple[str, ...]:
-    """Return the names of the contestants of the standard comparison, in order."""
-    analytic = (n for name in registered_controllers() for n in _shown_controller(name))
+    """Return the names of the contestants of the standard comparison, in order.
+
+    Controllers that need a package that is not installed are left out; asked for, they say which.
+    """
+    analytic = (n for name in available_controllers() for n in _shown_controller(name))
     return ("zero", "random", *analytic, *(n for f in shipped_families() for n in _shown(f)))
 
 

@@ -7,7 +7,7 @@ them by the heading θ gives the paper's world coordinates.
 Reading order, beside the paper (docs/paper_map.md has every equation):
 
 =================  ================================================================================
-II.A, IV.B         ``dynamics``: ``chain``, ``robot_model`` (1), (2), (7); ``frames``;
+II.A, IV.B         ``dynamics``: ``chain``, ``robot_model`` (1), (2), (7); ``frames``, ``towing``;
                    ``task_space`` (3), (4), (8), (28); ``redundancy``,
                    ``pseudoinverse_resolution`` IV.B; ``feedback_linearization`` (28);
                    ``measured_force``: (2) with the grasp force in the place of a model
@@ -35,5 +35,8 @@ IV.A, V            ``control``: ``velocity_field`` IV.A, ``ways``, ``oriented_fi
                    ``effective_damping``: what sampling and wrong parameters make of it;
                    ``disk_margin``, ``gain_search``: gains for the object at hand;
                    ``disturbance_observer``, ``swing_following``, ``observed_loop``: without a model
+IV, beyond         ``control``: ``settling_field``, ``moving_reference``: what regulators and
+                   shapers follow; ``sampled_lqr``; ``input_shaping``; ``prediction``, ``horizon``,
+                   ``receding_horizon``, ``quadratic_program``: plans with limits
 =================  ================================================================================
 """

@@ -10,6 +10,7 @@ from optuna import Trial
 from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.theory.control.control_laws import ForceLoopGains
+from defmanip_gym.training import ladder_spaces
 
 Overrides = dict[str, Any]
 
@@ -84,4 +85,7 @@ def tanner(trial: Trial) -> Controller:
 
 ANALYTIC_SPACES: dict[str, Callable[[Trial], Controller]] = {
     "tanner": tanner,
+    "lqr": ladder_spaces.lqr,
+    "shaped": ladder_spaces.shaped,
+    "mpc": ladder_spaces.mpc,
 }

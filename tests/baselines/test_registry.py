@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from defmanip_gym.baselines.registry import (
+    available_controllers,
     factory_at,
     identity_of,
     make_controller,
@@ -46,8 +47,14 @@ def strangers(tmp_path, monkeypatch):
 
 
 def test_every_registered_controller_can_be_made():
-    for reference in registered_controllers().values():
+    for reference in available_controllers().values():
         assert make_controller(reference, TransportConfig()).predict
+
+
+def test_one_whose_package_is_missing_is_not_available(monkeypatch):
+    monkeypatch.setitem(sys.modules, "daqp", None)  # as if it were not installed
+    assert "lqr" in available_controllers() and "mpc" in registered_controllers()
+    assert "mpc" not in available_controllers()
 
 
 def test_a_strangers_controller_is_made_from_the_working_directory(strangers):

@@ -12,16 +12,14 @@ as a reference to compare with.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from defmanip_gym.compiled import machine_code, without_garbage_collection
-from defmanip_gym.errors import InstallationError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
+from defmanip_gym.theory.control.quadratic_program import daqp_solver
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.barrier_rows import half_spaces_all
 from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
@@ -90,7 +88,7 @@ class CbfQpFilter(StorageFilter):
         params: CbfQpParams = CbfQpParams(),
     ) -> None:
         self.params = require_params("params", params, CbfQpParams)
-        self._solve = _solver()
+        self._solve = daqp_solver(self.name)
         super().__init__(
             beam,
             sigma_rad=sigma_rad,
@@ -160,18 +158,3 @@ class CbfQpFilter(StorageFilter):
             return np.zeros(3)
         nearest: Array = np.clip(found[:3], -self._largest, self._largest)
         return nearest
-
-
-def _solver() -> Callable[..., Any]:
-    """Return DAQP's function that solves a program, or raise InstallationError."""
-    try:
-        from daqp import solve
-    except ModuleNotFoundError as error:
-        raise InstallationError(
-            "the package that cbf_qp needs",
-            error.name,
-            "one that is installed",
-            "Install it with: pip install 'defmanip_gym[qp]'.",
-        ) from error
-    solver: Callable[..., Any] = solve
-    return solver
