@@ -47,10 +47,10 @@ def variants() -> tuple[Variant, ...]:
 
     def field(inner_loop: InnerLoopKind, observer_gain: float) -> FieldController:
         return FieldController(
-            params=FieldParams(inner_loop=inner_loop, observer_gain=observer_gain)
+            params=FieldParams(inner_loop=inner_loop, observer_gain_per_s=observer_gain)
         )
 
-    own = FieldParams().observer_gain
+    own = FieldParams().observer_gain_per_s
     return (
         Variant(name="tanner", controller=TannerController(beam=NOMINAL_BEAM), inner_loop="model"),
         Variant(name="(28) alone", controller=field("model", 0.0), inner_loop="model"),

@@ -26,5 +26,6 @@ def test_the_elbow_holds_as_much_as_the_page_says():
 def test_the_gains_of_the_derivation_are_the_defaults():
     derivations = (Path(__file__).parents[1] / "docs" / "derivations.md").read_text()
     own = FieldParams()
-    told = f"L = {own.observer_gain:g}, ε = {own.tracking_gain:g}, slope {own.approach_rate:g}"
+    slope = own.way.approach_rate_per_s
+    told = f"L = {own.observer_gain_per_s:g}, ε = {own.tracking_gain:g}, slope {slope:g}"
     assert f"{told}, κ = {own.following_rate:g}" in derivations

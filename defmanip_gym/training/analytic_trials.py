@@ -15,7 +15,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.errors import GainError
 from defmanip_gym.evaluation.seeds import VALIDATION_SEED
-from defmanip_gym.training.search_spaces import ANALYTIC_SPACES
+from defmanip_gym.training.analytic_spaces import ANALYTIC_SPACES
 from defmanip_gym.training.study import is_as_in_the_file
 from defmanip_gym.training.tune_config import TuneConfig
 
@@ -67,6 +67,7 @@ def validation_score(controller: Controller, config: TuneConfig) -> Score:
         num_envs=count,
         num_threads=config.num_threads,
         autoreset_mode=AutoresetMode.DISABLED,
+        inner_loop=getattr(controller, "inner_loop", "model"),
     )
     try:
         return _score(controller, cast(DeformTransportVectorEnv, env.unwrapped), count)

@@ -1,4 +1,4 @@
-"""What a study may vary in each recipe and controller; everything else stays as it is."""
+"""What a study may vary in each recipe; everything else stays as in its hyperparameter file."""
 
 from __future__ import annotations
 
@@ -6,11 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from optuna import Trial
-
-from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
-from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.theory.control.control_laws import ForceLoopGains
-from defmanip_gym.training import ladder_spaces
 
 Overrides = dict[str, Any]
 
@@ -63,29 +58,4 @@ SEARCH_SPACES: dict[str, Callable[[Trial], Overrides]] = {
     "lagrangian": lagrangian,
     "sac": off_policy,
     "tqc": off_policy,
-}
-
-
-def tanner(trial: Trial) -> Controller:
-    """Return the paper's controller with other design choices."""
-    return TannerController(
-        params=TannerParams(
-            acceleration_bound=trial.suggest_float("acceleration_bound", 0.5, 3.0),
-            approach_rate=trial.suggest_float("approach_rate", 0.3, 6.0, log=True),
-            deceleration_share=trial.suggest_float("deceleration_share", 0.1, 0.8),
-            tracking_gain=trial.suggest_float("tracking_gain", 1.0, 8.0, log=True),
-            yaw_rate_bound=trial.suggest_float("yaw_rate_bound", 0.5, 3.0),
-            gains=ForceLoopGains(
-                k1=trial.suggest_float("k1", 0.0, 0.9),
-                k2=trial.suggest_float("k2", 0.2, 10.0, log=True),
-            ),
-        )
-    )
-
-
-ANALYTIC_SPACES: dict[str, Callable[[Trial], Controller]] = {
-    "tanner": tanner,
-    "lqr": ladder_spaces.lqr,
-    "shaped": ladder_spaces.shaped,
-    "mpc": ladder_spaces.mpc,
 }

@@ -10,7 +10,7 @@ from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.training.config import Recipe, TrainConfig
 from defmanip_gym.validation import require_choice, require_whole, settle
 
-AnalyticName = Literal["tanner", "lqr", "shaped", "mpc"]
+AnalyticName = Literal["tanner", "oriented", "field", "lqr", "shaped", "mpc"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,11 +12,12 @@ from defmanip_gym.baselines.registry import registered_controllers
 from defmanip_gym.errors import ParameterError, RunFolderError
 from defmanip_gym.training import study as studies
 from defmanip_gym.training import tuning
+from defmanip_gym.training.analytic_spaces import ANALYTIC_SPACES
 from defmanip_gym.training.config import ALGORITHM_OF
 from defmanip_gym.training.environments import make_training_env
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.model import build_model
-from defmanip_gym.training.search_spaces import ANALYTIC_SPACES, SEARCH_SPACES
+from defmanip_gym.training.search_spaces import SEARCH_SPACES
 from defmanip_gym.training.tune_config import AnalyticName, TuneConfig
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from defmanip_gym.baselines.analytic.tanner import TannerParams
+from defmanip_gym.baselines.analytic.tanner_loop import tanner_loop
+from defmanip_gym.baselines.analytic.tanner_params import TannerParams
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.gain_search import loop_with_margin, slowest_swing
-from defmanip_gym.theory.control.stability import SampledLoop
-from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 from defmanip_gym.validation import require_params, require_range
 
 
@@ -51,17 +48,12 @@ def gains_for(
     reference = BeamParams()
     per_damping, _, _ = slowest_swing(reference)
     found = loop_with_margin(
-        SampledLoop(
-            robot=robot,
-            goal_pitch=JOINT_TO_PITCH @ np.array(task.goal[3:5]),
+        tanner_loop(
+            params,
             beam=beam,
             linearization_beam=replace(beam, damping=0.0),
-            force_law_damping=params.force_law_damping,
-            gains=params.gains,
-            tracking_gain=params.tracking_gain,
-            approach_rate=params.approach_rate,
-            period_s=task.control_period_s,
-            feedforward=params.feedforward,
+            robot=robot,
+            task=task,
         ),
         added_ratio=max(per_damping * (reference.damping - params.force_law_damping), 0.0),
         margin=margin,

@@ -71,7 +71,7 @@ def test_single_and_batched_predictions_agree_and_memory_starts_anew():
 def test_it_is_made_for_the_inner_loop_that_measures_the_force():
     made = make_controller(TransportConfig())
     assert made.inner_loop == "measured_force"
-    assert made.identity["params"]["observer_gain"] == FieldParams().observer_gain
+    assert made.identity["params"]["observer_gain_per_s"] == FieldParams().observer_gain_per_s
 
 
 @pytest.mark.parametrize("segments", [1, 3, 8])
@@ -81,7 +81,7 @@ def test_it_needs_no_other_gains_for_more_segments(segments):
 
 def test_gains_that_grow_and_values_without_sense_are_refused():
     with pytest.raises(GainError, match="spectral radius"):
-        FieldController(params=FieldParams(observer_gain=120.0))
+        FieldController(params=FieldParams(observer_gain_per_s=120.0))
     with pytest.raises(ParameterError, match="inner_loop"):
         FieldParams(inner_loop="guess")
     with pytest.raises(ParameterError, match="params"):
