@@ -26,6 +26,7 @@ def module(request):
 
 
 def records(controller, scenarios, config):
+    config = replace(config, inner_loop=controller.inner_loop)
     entry = Entry(suite="test", contestant="ladder", family="analytic")
     episodes = rollout(
         entry,
@@ -50,8 +51,8 @@ def test_it_arrives_from_where_training_starts_within_sigma(module):
 @pytest.mark.parametrize(
     "condition",
     [
-        Condition(name="light", mass_factor=0.8),
-        Condition(name="heavy", mass_factor=1.2),
+        Condition(name="light", mass_factor=0.5),
+        Condition(name="heavy", mass_factor=2.0),
         Condition(name="pushed", disturbance=DisturbanceParams(force_bias_n=2.0)),
         Condition(name="late", actuation_delay_s=0.02),
     ],

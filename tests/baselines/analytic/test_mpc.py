@@ -24,11 +24,12 @@ def daqp():
 @pytest.mark.parametrize("share", [0.5, 0.9])
 def test_the_swing_keeps_to_its_share_of_sigma(daqp, share):
     (scenario,) = suite_named("nominal").scenarios[:1]
+    controller = MpcController(params=MpcParams(sigma_share=share))
     (episode,) = rollout(
         Entry(suite="test", contestant="mpc", family="analytic"),
-        MpcController(params=MpcParams(sigma_share=share)),
+        controller,
         [scenario],
-        config=TransportConfig(constraint_mode="cost"),
+        config=TransportConfig(constraint_mode="cost", inner_loop=controller.inner_loop),
         horizon_s=20.0,
     )
     assert episode.record.success

@@ -21,7 +21,7 @@ def swings(controller):
         Entry(suite="test", contestant="shaped", family="analytic"),
         controller,
         [SCENARIO],
-        config=TransportConfig(constraint_mode="cost"),
+        config=TransportConfig(constraint_mode="cost", inner_loop=controller.inner_loop),
         horizon_s=6.0,
         traced=("paper",),
     )
