@@ -21,14 +21,16 @@ _CONTESTANT = f"time_optimal/{FILTER_OPTION}"
 def driven(plans: StoredPlans, suite: Suite) -> tuple[EpisodeRecord, ...]:
     """Return the records of following the plans through a suite, inside the storage filter."""
     records: list[EpisodeRecord] = []
+    controller = TimeOptimalController(plans=plans)
+    protection = StorageProtection(FILTER_OPTION, inner_loop=controller.inner_loop)
     for condition in suite.conditions:
         episodes = rollout(
             Entry(suite=suite.name, contestant=_CONTESTANT, family="analytic"),
-            TimeOptimalController(plans=plans),
+            controller,
             suite.of(condition),
-            config=condition.environment,
+            config=condition.environment_on(controller.inner_loop),
             horizon_s=suite.horizon_s,
-            safety_filter=StorageProtection(FILTER_OPTION).filter_for(condition),
+            safety_filter=protection.filter_for(condition),
             delay_periods=condition.delay_periods,
         )
         records += [episode.record for episode in episodes]

@@ -17,17 +17,22 @@ from numpy.typing import NDArray
 from defmanip_gym.baselines.analytic.planner_state import planner_states
 from defmanip_gym.baselines.analytic.time_optimal_params import TimeOptimalParams
 from defmanip_gym.baselines.controller import State
-from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams
-from defmanip_gym.planning.model import HEADING, Array
+from defmanip_gym.planning.model import HEADING, REACH, VELOCITY, Array
 from defmanip_gym.planning.setting import PlanningSetting
 from defmanip_gym.planning.stored import StoredPlans
 from defmanip_gym.planning.tracking import holding_gain
 from defmanip_gym.planning.tracks import Tracks, fitting_plans
 from defmanip_gym.task_params import TaskParams
+from defmanip_gym.theory.control.disturbance_observer import (
+    DisturbanceObserver,
+    ObserverMemory,
+    weight_disturbance,
+)
 from defmanip_gym.theory.dynamics.frames import world_to_base
-from defmanip_gym.theory.dynamics.robot_model import ArmKinematics
+from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_params
 
 BoolArray = NDArray[np.bool_]
@@ -85,6 +90,12 @@ class TimeOptimalController:
         self.layout = ObservationLayout(1)
         self.kinematics = ArmKinematics(self.setting.robot)
         period_s = self.setting.task.control_period_s
+        self._observer = DisturbanceObserver(
+            gain=params.observer_gain_per_s,
+            period_s=period_s,
+            w_limit=self.setting.task.max_acceleration_m_s2,
+            max_speed_m_s=self.setting.task.max_speed_m_s,
+        )
         self._hold = holding_gain(self.setting.model, period_s, self.params.weights)
 
     def predict(
@@ -94,27 +105,43 @@ class TimeOptimalController:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[Array, State | None]:
-        """Return w / a_max and (where plans begin, samples since then).
+        """Return w / a_max and (where plans begin, samples since then, the observer's memory).
 
         Raises:
             InstallationError: a start that no stored plan is for, and CasADi is not installed.
             ParameterError: a start without plan.
         """
-        states = planner_states(np.atleast_2d(observation), self.layout, self.kinematics)
+        batch = np.atleast_2d(observation)
+        states = planner_states(batch, self.layout, self.kinematics)
         origins, steps = states, np.zeros(len(states), dtype=np.int64)
+        disturbance = self._first_disturbance(batch)
         if state is not None:
             goes_on = np.ones(len(states), dtype=bool)
             if episode_start is not None:
                 goes_on = ~np.atleast_1d(episode_start)
             origins = np.where(goes_on[:, None], state[0], states)
             steps = np.where(goes_on, state[1], 0)
+            memory = ObserverMemory(estimate=state[2], w=state[3], velocity=state[4])
+            observed = self._observed(states, memory)
+            disturbance = np.where(goes_on[:, None], observed, disturbance)
         if self.params.replans:
             lost = self._lost(states, origins, steps)
             origins = np.where(lost[:, None], states, origins)
             steps = np.where(lost, 0, steps)
-        w = self._commands(states, origins, steps)
-        action = np.clip(w / self.setting.task.max_acceleration_m_s2, -1.0, 1.0)
-        return action.reshape(*np.shape(observation)[:-1], 3), (origins, steps + 1)
+        memory = self._observer.command(
+            self._commands(states, origins, steps),
+            disturbance,
+            states[:, VELOCITY],
+            states[:, HEADING],
+        )
+        action = np.clip(memory.w / self.setting.task.max_acceleration_m_s2, -1.0, 1.0)
+        remembered = (origins, steps + 1, memory.estimate, memory.w, memory.velocity)
+        return action.reshape(*np.shape(observation)[:-1], 3), remembered
+
+    @property
+    def inner_loop(self) -> InnerLoopKind:
+        """The inner loop that the environment is to have."""
+        return self.params.inner_loop
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -125,8 +152,21 @@ class TimeOptimalController:
             "plans": self.tracks.stored.digest,
         }
 
+    def _first_disturbance(self, batch: Array) -> Array:
+        """Return what is expected before anything was observed, (n, 3) m/s²."""
+        if self.params.inner_loop == "measured_force":
+            return np.zeros((len(batch), 3))
+        pitch = self.layout.part(batch, "joints") @ JOINT_TO_PITCH.T
+        force = self.layout.part(batch, "grasp_force_b")
+        return weight_disturbance(self.setting.robot, self.setting.beam, pitch, force)
+
+    def _observed(self, states: Array, memory: ObserverMemory) -> Array:
+        """Return the observer's estimate of this sample, (n, 3) m/s²."""
+        yaw_rate = states[:, VELOCITY][:, 1] / states[:, REACH]
+        return self._observer.updated(memory, states[:, VELOCITY], states[:, HEADING], yaw_rate)
+
     def _commands(self, states: Array, origins: Array, steps: NDArray[np.int64]) -> Array:
-        """Return w, (n, 3) m/s²: the plan's with feedback, and beyond its end the holding one."""
+        """Return u_o, (n, 3) m/s²: the plan's with feedback, and beyond its end the holding one."""
         w = np.empty((len(states), 3))
         for row, step in enumerate(steps.tolist()):
             now, track = states[row], self.tracks.of(origins[row])
