@@ -10,7 +10,7 @@ import optuna
 from gymnasium.vector import AutoresetMode
 
 from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.baselines.registry import make_controller, registered_controllers
+from defmanip_gym.baselines.registry import inner_loop_of, make_controller, registered_controllers
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.errors import GainError
@@ -67,6 +67,7 @@ def validation_score(controller: Controller, config: TuneConfig) -> Score:
         num_envs=count,
         num_threads=config.num_threads,
         autoreset_mode=AutoresetMode.DISABLED,
+        inner_loop=inner_loop_of(config.algo, controller),
     )
     try:
         return _score(controller, cast(DeformTransportVectorEnv, env.unwrapped), count)
