@@ -35,6 +35,8 @@ from defmanip_gym.validation import (
 class FieldParams(LawParams):
     """Design choices of ``field``; with the inner loop ``"model"`` it weighs the object first.
 
+    The defaults are what a study found (docs/training.md).
+
     Attributes:
         way: the field to travel.
         observer_gain_per_s: L of the disturbance observer, 1/s.
@@ -46,18 +48,19 @@ class FieldParams(LawParams):
 
     way: WayParams = field(
         default_factory=lambda: WayParams(
-            velocity_field="normalized",
-            speed_share=0.9,
-            deceleration_m_s2=1.35,
-            vertical_deceleration_m_s2=1.35,
-            approach_rate_per_s=4.0,
+            turn_radius_m=2.6,
+            yaw_rate_rad_s=1.1,
+            speed_share=0.99,
+            deceleration_m_s2=1.9,
+            vertical_deceleration_m_s2=0.85,
+            approach_rate_per_s=4.7,
         )
     )
-    observer_gain_per_s: float = 5.0
-    tracking_gain: float = 4.0
-    acceleration_bound: float = 2.55
-    yaw_rate_bound: float = 1.0
-    following_rate: float = 2.0
+    observer_gain_per_s: float = 6.0
+    tracking_gain: float = 3.5
+    acceleration_bound: float = 2.85
+    yaw_rate_bound: float = 2.4
+    following_rate: float = 2.5
 
     def __post_init__(self) -> None:
         super().__post_init__()
