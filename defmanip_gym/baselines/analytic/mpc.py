@@ -10,62 +10,27 @@ brake, and how, is left to the program.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
-from defmanip_gym.baselines.analytic.sampled_law import Array, LawParams, Memory, SampledLaw
-from defmanip_gym.baselines.analytic.way_params import WayParams
+from defmanip_gym.baselines.analytic.mpc_params import MpcParams
+from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams, RobotParams, validated_sigma
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.control_laws import saturated_tracking
-from defmanip_gym.theory.control.horizon import HorizonStart, HorizonWeights
+from defmanip_gym.theory.control.horizon import HorizonStart
 from defmanip_gym.theory.control.moving_reference import streamline
-from defmanip_gym.theory.control.prediction import HORIZON_BLOCKS, Prediction, validated_blocks
+from defmanip_gym.theory.control.prediction import Prediction
 from defmanip_gym.theory.control.receding_horizon import HorizonProgram
 from defmanip_gym.theory.dynamics.frames import base_to_world, turned, world_to_base
 from defmanip_gym.theory.payload.zero_dynamics import linearize
-from defmanip_gym.validation import require_between, require_params, require_positive, settle
+from defmanip_gym.validation import require_params
+
+__all__ = ["MpcController", "MpcParams", "make_controller"]
 
 _SLOW_M_S = 0.3  # below it the streamline tells better where the grasp is heading
 _STEP_S = 0.1  # along streamlines
-
-
-@dataclass(frozen=True, kw_only=True)
-class MpcParams(LawParams):
-    """Design choices of ``mpc``.
-
-    Attributes:
-        way: the reference; its braking is the program's business, so it brakes hard.
-        blocks: control periods for which the plan keeps an acceleration.
-        weights: of the program.
-        heading_share: of the task's tolerance, within which the heading at the goal costs nothing.
-        sigma_share: of σ, up to which the plan may swing the object.
-        acceleration_share: of the largest acceleration, up to which it may accelerate.
-        tracking_gain: ε of Eq. (20) for the height, and for all axes where no plan is found, 1/s.
-    """
-
-    way: WayParams = field(
-        default_factory=lambda: WayParams(
-            deceleration_m_s2=6.0, vertical_deceleration_m_s2=0.35, approach_rate_per_s=8.0
-        )
-    )
-    blocks: tuple[int, ...] = HORIZON_BLOCKS
-    weights: HorizonWeights = field(default_factory=HorizonWeights)
-    heading_share: float = 0.6
-    sigma_share: float = 0.9
-    acceleration_share: float = 0.97
-    tracking_gain: float = 4.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        settle(self, "blocks", validated_blocks)
-        settle(self, "weights", require_params, HorizonWeights)
-        for name in ("heading_share", "sigma_share", "acceleration_share"):
-            settle(self, name, require_between, 0.0, 1.0)
-        settle(self, "tracking_gain", require_positive, "1/s")
 
 
 class MpcController(SampledLaw):

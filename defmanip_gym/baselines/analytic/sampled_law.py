@@ -8,14 +8,13 @@ themselves know neither a wrong weight nor a push.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.analytic.grasp_sample import GraspSample, grasp_sample
-from defmanip_gym.baselines.analytic.way_params import WayParams
+from defmanip_gym.baselines.analytic.law_params import LawParams
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.observation import ObservationLayout
@@ -27,37 +26,10 @@ from defmanip_gym.theory.control.disturbance_observer import (
     weight_disturbance,
 )
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.validation import (
-    plain,
-    require_choice,
-    require_non_negative,
-    require_params,
-    settle,
-)
+from defmanip_gym.validation import plain, require_params
 
 Array = NDArray[np.float64]
 Memory = tuple[Array, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class LawParams:
-    """Design choices of every law.
-
-    Attributes:
-        inner_loop: that the environment is to have. The one that measures the grasp force needs no
-            weight of the object.
-        way: to the goal.
-        observer_gain_per_s: L of the disturbance observer, 1/s; 0 leaves it at its first estimate.
-    """
-
-    inner_loop: InnerLoopKind = "measured_force"
-    way: WayParams = field(default_factory=WayParams)
-    observer_gain_per_s: float = 10.0
-
-    def __post_init__(self) -> None:
-        require_choice("inner_loop", self.inner_loop, get_args(InnerLoopKind))
-        settle(self, "way", require_params, WayParams)
-        settle(self, "observer_gain_per_s", require_non_negative, "1/s")
 
 
 class SampledLaw(ABC):

@@ -14,7 +14,8 @@ from typing import get_args
 import numpy as np
 
 from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
-from defmanip_gym.baselines.analytic.sampled_law import Array, LawParams, Memory, SampledLaw
+from defmanip_gym.baselines.analytic.law_params import LawParams
+from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams, RobotParams

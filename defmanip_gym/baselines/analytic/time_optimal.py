@@ -20,6 +20,7 @@ from defmanip_gym.baselines.controller import State
 from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.planning.following import Following
 from defmanip_gym.planning.model import HEADING, REACH, VELOCITY, Array
 from defmanip_gym.planning.setting import PlanningSetting
 from defmanip_gym.planning.stored import StoredPlans
@@ -31,7 +32,6 @@ from defmanip_gym.theory.control.disturbance_observer import (
     ObserverMemory,
     weight_disturbance,
 )
-from defmanip_gym.theory.dynamics.frames import world_to_base
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_params
 
@@ -96,7 +96,12 @@ class TimeOptimalController:
             w_limit=self.setting.task.max_acceleration_m_s2,
             max_speed_m_s=self.setting.task.max_speed_m_s,
         )
-        self._hold = holding_gain(self.setting.model, period_s, self.params.weights)
+        self.following = Following(
+            tracks=self.tracks,
+            hold=holding_gain(self.setting.model, period_s, params.weights),
+            lost_m=params.lost_m,
+            patience_samples=params.patience_s / period_s,
+        )
 
     def predict(
         self,
@@ -125,11 +130,11 @@ class TimeOptimalController:
             observed = self._observed(states, memory)
             disturbance = np.where(goes_on[:, None], observed, disturbance)
         if self.params.replans:
-            lost = self._lost(states, origins, steps)
+            lost = self.following.lost(states, origins, steps)
             origins = np.where(lost[:, None], states, origins)
             steps = np.where(lost, 0, steps)
         memory = self._observer.command(
-            self._commands(states, origins, steps),
+            self.following.commands(states, origins, steps),
             disturbance,
             states[:, VELOCITY],
             states[:, HEADING],
@@ -165,33 +170,6 @@ class TimeOptimalController:
         yaw_rate = states[:, VELOCITY][:, 1] / states[:, REACH]
         return self._observer.updated(memory, states[:, VELOCITY], states[:, HEADING], yaw_rate)
 
-    def _commands(self, states: Array, origins: Array, steps: NDArray[np.int64]) -> Array:
-        """Return u_o, (n, 3) m/s²: the plan's with feedback, and beyond its end the holding one."""
-        w = np.empty((len(states), 3))
-        for row, step in enumerate(steps.tolist()):
-            now, track = states[row], self.tracks.of(origins[row])
-            if step < len(track.commands):
-                error = _deviation(now, track.states[step])
-                w[row] = track.commands[step] - track.gains[step] @ error
-            else:
-                error = now.copy()
-                error[:3] = world_to_base(now[:3], now[HEADING])
-                w[row] = -self._hold @ error
-        return w
-
-    def _lost(self, states: Array, origins: Array, steps: NDArray[np.int64]) -> BoolArray:
-        """Return which episodes are far off their plan, or have not ended long after it, (n,)."""
-        lost = np.empty(len(states), dtype=np.bool_)
-        patience = self.params.patience_s / self.setting.task.control_period_s
-        for row, step in enumerate(steps.tolist()):
-            track = self.tracks.of(origins[row])
-            if step < len(track.commands):
-                away = _deviation(states[row], track.states[step])[:3]
-                lost[row] = np.linalg.norm(away) > self.params.lost_m
-            else:
-                lost[row] = step - len(track.commands) > patience
-        return lost
-
 
 def make_controller(config: TransportConfig) -> TimeOptimalController:
     """Plans the quickest motion from the start, with margins, and follows it by LQR."""
@@ -201,9 +179,3 @@ def make_controller(config: TransportConfig) -> TimeOptimalController:
         task=config.task,
         sigma_rad=config.sigma_rad,
     )
-
-
-def _deviation(now: Array, planned: Array) -> Array:
-    error = now - planned
-    error[HEADING] = math.remainder(error[HEADING], math.tau)
-    return error
