@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from defmanip_gym.evaluation.options import OPTIONS
+from defmanip_gym.evaluation.options import OPTIONS, OTHER_INNER_LOOP
 
 GUEST_COLOURS = ("#7a5195", "#c77dba")  # of the user's own agents
 
@@ -14,16 +14,23 @@ def contestant_colour(base: str, method: str) -> str:
         base: its name without the filter.
         method: names the filter; empty for none. The further down the list of options, the greyer.
     """
-    pair = _COLOURS.get(base) or _MORE_COLOURS[sum(base.encode()) % len(_MORE_COLOURS)]
-    if not method:
-        return pair[0]
-    share = OPTIONS.index(method) / len(OPTIONS)
-    channels = (int(pair[1][i : i + 2], 16) for i in (1, 3, 5))
-    mixed = (round(channel + share * (_GREY - channel)) for channel in channels)
+    own = base.removesuffix(OTHER_INNER_LOOP)
+    pair = _COLOURS.get(own) or _MORE_COLOURS[sum(own.encode()) % len(_MORE_COLOURS)]
+    colour = pair[0]
+    if method:
+        colour = _mixed(pair[1], _GREY, OPTIONS.index(method) / len(OPTIONS))
+    return colour if own == base else _mixed(colour, _WHITE, _LIGHTER)
+
+
+def _mixed(colour: str, level: int, share: float) -> str:
+    """Return a colour with a share of the grey of a level in it."""
+    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    mixed = (round(channel + share * (level - channel)) for channel in channels)
     return "#" + "".join(f"{channel:02x}" for channel in mixed)
 
 
-_GREY = 0x80
+_GREY, _WHITE = 0x80, 0xFF
+_LIGHTER = 0.3  # on the other inner loop
 _COLOURS = {
     "tanner": ("#45b5aa", "#12806a"),
     "oriented": ("#6cc4d6", "#1a7f96"),
