@@ -20,7 +20,7 @@ from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report.columns import COLUMNS, Column
 from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS
-from defmanip_gym.evaluation.report.sentences import certificate_claim, suite_claims
+from defmanip_gym.evaluation.report.sentences import answer, certificate_claim, suite_claims
 from defmanip_gym.evaluation.store import read_records
 from defmanip_gym.evaluation.suites import SUITES, Suite
 
@@ -36,6 +36,8 @@ _FIGURES = {
 
 _HEAD = """# Results
 
+{answer}
+
 Learned against analytic controllers on all suites, with all agents. `make benchmark` makes this
 page: it runs
 
@@ -47,10 +49,12 @@ and then `python docs/make_results.py`, which takes everything from there. What 
 intervals mean: [evaluation.md](evaluation.md). What each agent is: `defmanip agents`.
 
 How to read it: a contestant's part after the slash is the safety filter around it; without a slash
-there is none. Scores are mean speeds towards the goal as a share of the speed
-limit, 0 for an episode without success. A sentence names a winner only where intervals separate it
-from everybody else in its class. Small print in the tables: 95 % intervals. How long a decision
-takes depends on the machine, and is in the report that `evaluate.py` writes.
+there is none. After an @ stands the inner loop that it runs on, if not its own. Scores are mean
+speeds towards the goal as a share of the speed limit; T*/T is the share of the time-optimal speed
+from the same start ([optimum.md](optimum.md)). Both are 0 for an episode without success. A
+sentence names a winner only where intervals separate it from everybody else in its class. Small
+print in the tables: 95 % intervals. How long a decision takes depends on the machine, and is in the
+report that `evaluate.py` writes.
 
 {certificates}
 """
@@ -83,16 +87,22 @@ def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
         lines = [row for row in rows if row["suite"] == suite.name]
         own = {row["contestant"]: int(row["episodes"]) for row in lines}
         order[suite.name], records[suite.name] = list(own), _records(benchmark, suite, own)
-    parts = [_HEAD.format(command=command[1], certificates=_certificates(records.values()))]
-    for suite in present:
-        analysis = analyse(
+    analyses = {
+        suite.name: analyse(
             records[suite.name],
             suite.name,
             order=order[suite.name],
             certified=[name for name in order[suite.name] if "/" in name],
         )
-        certificates = certificate_claim(records[suite.name])
-        claims = (*suite_claims(analysis), *filter(None, [certificates]))
+        for suite in present
+    }
+    told = answer(tuple(analyses.values()))
+    certificates = _certificates(records.values())
+    parts = [_HEAD.format(answer=told, command=command[1], certificates=certificates)]
+    for suite in present:
+        analysis = analyses[suite.name]
+        held = certificate_claim(records[suite.name])
+        claims = (*suite_claims(analysis), *filter(None, [held]))
         parts += [
             f"## {suite.name}\n",
             f"{suite.description}\n",

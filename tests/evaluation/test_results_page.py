@@ -85,6 +85,10 @@ def test_every_suite_has_its_sentences_tables_and_two_figures(benchmark, page):
         assert own.count(f"Made by `{benchmark[1].command}`") == 4
 
 
+def test_its_first_sentence_says_what_learning_adds(page):
+    assert page.read_text().startswith("# Results\n\nLearning adds something on ")
+
+
 def test_images_that_it_shows_exist(page):
     for target in re.findall(r"\]\((images/[^)]*)\)", page.read_text()):
         assert (page.parent / target).stat().st_size > 0

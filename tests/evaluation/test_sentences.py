@@ -7,7 +7,7 @@ import pytest
 from suite_records import suite_records
 
 from defmanip_gym.evaluation.analysis import analyse
-from defmanip_gym.evaluation.report.sentences import headline, suite_claims
+from defmanip_gym.evaluation.report.sentences import answer, headline, suite_claims
 
 SCENARIOS = 24
 DIFFICULTY = np.random.default_rng(0).uniform(-0.15, 0.15, SCENARIOS)
@@ -63,6 +63,22 @@ def test_whether_learning_beats_analysis_is_always_said(learned, claim, suffix, 
     matrices = {f"ppo{suffix}": scores(learned, 1, 5), f"tanner{suffix}": scores(0.40, 2)}
     claim = claim.replace("ppo", f"ppo{suffix}").replace("tanner", f"tanner{suffix}")
     assert f"{label}, {claim}"[:90] in text_of(matrices)
+
+
+@pytest.mark.parametrize(
+    ("learned", "claim"),
+    [
+        (0.45, "Learning adds something on nominal,"),
+        (
+            0.35,
+            "On no suite does learning add anything to what analytic controllers do. On nominal ",
+        ),
+        (0.40, "On nominal intervals do not separate them"),
+    ],
+)
+def test_the_answer_says_where_learning_adds_something(learned, claim):
+    matrices = {"ppo": scores(learned, 1, 5), "tanner": scores(0.40, 2)}
+    assert claim in answer([analysis_of(matrices)])
 
 
 def test_beating_some_analytic_contestants_only_is_not_called_a_win():

@@ -122,6 +122,37 @@ def duel_sentence(who: str, result: LearnedAgainstAnalytic) -> str:
     )
 
 
+def answer(analyses: Sequence[SuiteAnalysis]) -> str:
+    """Return what learning adds on which suites, in a sentence or two."""
+    verdicts = {
+        analysis.suite: {
+            duel.result.verdict
+            for duel in (analysis.free_duel, analysis.certified_duel)
+            if duel is not None
+        }
+        for analysis in analyses
+    }
+    better = [suite for suite, found in verdicts.items() if "learned" in found]
+    worse = [suite for suite, found in verdicts.items() if found == {"analytic"}]
+    open_ = [suite for suite in verdicts if suite not in (*better, *worse)]
+    parts = []
+    if better:
+        parts.append(
+            f"Learning adds something on {_listed(better)}, where an agent, alone or inside a "
+            "filter, scores higher than every analytic controller of its class."
+        )
+    else:
+        parts.append("On no suite does learning add anything to what analytic controllers do.")
+    if worse:
+        parts.append(
+            f"On {_listed(worse)} the best analytic controller scores higher than every agent, "
+            "alone and inside a filter."
+        )
+    if open_:
+        parts.append(f"On {_listed(open_)} intervals do not separate them throughout.")
+    return " ".join(parts)
+
+
 def contrast_sentence(duel: Duel) -> str:
     """Return what the two best differ by besides the score."""
     result, contrast = duel.result, duel.contrast
