@@ -49,6 +49,7 @@ compare: $(CORE)  ## run all controllers on the same scenarios; table and HTML r
 	$(BIN)/python evaluate.py
 
 benchmark: $(CORE)  ## run all suites with all agents; writes docs/results.md and the agents' scores
+	$(PIP_INSTALL) --editable '.[qp]'  # mpc takes part
 	$(BIN)/python evaluate.py --suites all --episodes all --members all --output results/benchmark
 	$(BIN)/defmanip agents --score results/benchmark
 	$(BIN)/python docs/make_results.py
