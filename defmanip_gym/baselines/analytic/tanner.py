@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.baselines.analytic.cascade import Cascade, LoopMemory
+from defmanip_gym.baselines.analytic.gains import gains_for
 from defmanip_gym.baselines.analytic.grasp_sample import grasp_sample
 from defmanip_gym.baselines.analytic.motion_bounds import motion_bounds
 from defmanip_gym.baselines.analytic.tanner_loop import require_stable, tanner_loop
@@ -143,6 +144,10 @@ def make_controller(
     config: TransportConfig, certificate: Certificate | None = None
 ) -> TannerController:
     """The paper's controller: velocity field, tracking and PI force loop."""
+    beam, robot, task = config.beam, config.believed_robot, config.task
+    params = TannerParams()
+    if beam.segment_count > 1:  # whose force loop is another one
+        params = gains_for(beam, robot=robot, task=task, params=params)
     return TannerController(
-        beam=config.beam, robot=config.believed_robot, task=config.task, certificate=certificate
+        beam=beam, robot=robot, task=task, certificate=certificate, params=params
     )

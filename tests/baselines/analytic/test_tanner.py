@@ -6,7 +6,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams
+from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParams, make_controller
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError, GainError, ParameterError
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, CertificateConditions, certify
@@ -138,3 +139,13 @@ def test_certificates_without_room_to_lift_or_turn_are_refused():
 def test_parameters_of_another_kind_are_refused(name, wrong):
     with pytest.raises(ParameterError, match=name):
         TannerController(**{name: wrong})
+
+
+@pytest.mark.parametrize("segments", [2, 8, 16])
+def test_its_factory_finds_gains_for_beams_of_several_segments(segments):
+    config = TransportConfig(beam=BeamParams(segment_count=segments))
+    assert make_controller(config).sampled_loop().spectral_radius() < 1.0
+
+
+def test_its_factory_takes_the_tuned_gains_for_a_rod():
+    assert make_controller(TransportConfig()).params == TannerParams()
