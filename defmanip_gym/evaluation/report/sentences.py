@@ -142,7 +142,10 @@ def answer(analyses: Sequence[SuiteAnalysis]) -> str:
             "filter, scores higher than every analytic controller of its class."
         )
     else:
-        parts.append("On no suite does learning add anything to what analytic controllers do.")
+        parts.append(
+            "Learning adds nothing that intervals show: on no suite does an agent score higher "
+            "than every analytic controller."
+        )
     if worse:
         parts.append(
             f"On {_listed(worse)} the best analytic controller scores higher than every agent, "
