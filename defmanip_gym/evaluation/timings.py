@@ -26,7 +26,8 @@ def decision_time_s(contestant: Contestant) -> float:
     condition = Condition(name="nominal")
     config = condition.environment_on(contestant.inner_loop)
     env = DeformTransportEnv(constraint_mode="cost", nominal_beam=config.nominal_beam)
-    observation = env.reset(seed=0)[0][None]
+    # where plans are stored from: a decision is timed, not the planning before the first one
+    observation = env.reset(seed=0, options={"start": "paper"})[0][None]
     env.close()
     controller = contestant.members[0].controller.build([0])
     filtering = None
