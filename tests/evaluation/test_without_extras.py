@@ -5,7 +5,7 @@ import sys
 
 CODE = """
 import sys
-sys.modules.update(dict.fromkeys(("casadi", "daqp", "torch", "stable_baselines3")))
+sys.modules.update(dict.fromkeys(("casadi", "daqp")))
 from defmanip_gym.evaluation.contestants import standard_contestants, standard_names
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.evaluation.timings import decision_time_s
