@@ -138,3 +138,9 @@ def test_certificates_without_room_to_lift_or_turn_are_refused():
 def test_parameters_of_another_kind_are_refused(name, wrong):
     with pytest.raises(ParameterError, match=name):
         TannerController(**{name: wrong})
+
+
+@pytest.mark.parametrize("name", ["bound_share", "deceleration_share", "speed_share"])
+def test_no_share_is_more_than_a_certificate_has(name):
+    with pytest.raises(ParameterError, match=name):
+        TannerParams(**{name: 1.2})
