@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import json
 import sys
 from importlib.metadata import distributions
 from importlib.util import find_spec
@@ -127,8 +128,21 @@ def identity_of(reference: str, controller: Controller) -> dict[str, Any]:
 
     That is what its attribute ``identity`` tells, if it has one, and, of a module of another
     package, the contents of that package's Python files.
+
+    Raises:
+        ControllerError: the attribute holds something else than JSON values.
     """
-    told = {"controller": reference, "identity": getattr(controller, "identity", None)}
+    identity = getattr(controller, "identity", None)
+    told = {"controller": reference, "identity": identity}
+    try:
+        json.dumps(identity)
+    except (TypeError, ValueError) as error:
+        raise ControllerError(
+            f"identity of {reference}",
+            identity,
+            "JSON values: mappings, lists, strings, numbers",
+            f"{error}; write arrays as lists.",
+        ) from error
     if reference.startswith(f"{_OWN}."):
         return told  # whose version is known to records
     return told | {"source": _digest(reference.partition(":")[0].partition(".")[0])}

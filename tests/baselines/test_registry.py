@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 
+from defmanip_gym.baselines.controller import ZeroController
 from defmanip_gym.baselines.registry import (
     available_controllers,
     factory_at,
@@ -94,3 +95,11 @@ def test_what_a_module_itself_lacks_is_its_own_error(strangers):
     reference = strangers("import something_that_nobody_has\n")
     with pytest.raises(ModuleNotFoundError, match="something_that_nobody_has"):
         factory_at(reference)
+
+
+def test_an_identity_that_json_cannot_hold_is_refused():
+    class Unclear(ZeroController):
+        identity = {"gains": np.zeros(3)}
+
+    with pytest.raises(ControllerError, match="write arrays as lists"):
+        identity_of("somebody:make", Unclear())

@@ -101,8 +101,10 @@ class LqrController(SampledLaw):
         fast = now.velocity_b - world_to_base(reference.velocity, now.heading)
         swing = now.swing - wanted[:, :1] * self.swing_per_acceleration
         forward = np.column_stack((far[:, 0], fast[:, 0], swing, now.swing_rate))
+        # not by BLAS, whose last bits depend on the number of rows
+        forward_w = np.einsum("nk,k->n", forward, self.forward_gains)
         sideways = self.side_gains[0] * far + self.side_gains[1] * fast
-        u_o = wanted - np.column_stack((forward @ self.forward_gains, sideways[:, 1:]))
+        u_o = wanted - np.column_stack((forward_w, sideways[:, 1:]))
         after = reference.moved(self.task.control_period_s)
         return u_o, (after.position, after.velocity)
 

@@ -65,12 +65,11 @@ class TannerParams:
             "approach_rate",
             "acceleration_bound",
             "yaw_rate_bound",
-            "bound_share",
-            "deceleration_share",
             "turn_radius",
         ):
             settle(self, name, require_positive)
-        settle(self, "speed_share", require_number, 1e-3, 1.0)
+        for name in ("bound_share", "deceleration_share", "speed_share"):
+            settle(self, name, require_number, 1e-3, 1.0)
         settle(self, "feedforward", require_flag)
         settle(self, "gains", require_params, ForceLoopGains)
         settle(self, "force_law_damping", require_number, -1e4, 1e4, "N m s/rad")

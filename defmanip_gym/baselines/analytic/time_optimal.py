@@ -33,7 +33,7 @@ from defmanip_gym.theory.control.disturbance_observer import (
     weight_disturbance,
 )
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.validation import require_params
+from defmanip_gym.validation import require_instance, require_params
 
 BoolArray = NDArray[np.bool_]
 
@@ -57,7 +57,8 @@ class TimeOptimalController:
         knows: what comparisons say that it knows beyond the observation.
 
     Raises:
-        ParameterError: the beam has several segments.
+        ParameterError: the beam has several segments, or an argument of another kind.
+        GainError: the observer would be unstable with its gain.
     """
 
     knows = "nominal robot and beam; plans made beforehand for the suites' starts"
@@ -78,8 +79,10 @@ class TimeOptimalController:
             task=TaskParams() if task is None else task,
             sigma_rad=sigma_rad,
         )
-        params = TimeOptimalParams() if params is None else params
-        self.params = require_params("params", params, TimeOptimalParams)
+        given = TimeOptimalParams() if params is None else params
+        self.params = params = require_params("params", given, TimeOptimalParams)
+        if plans is not None:
+            require_instance("plans", plans, StoredPlans)
         self.tracks = Tracks(
             setting=self.setting,
             stored=fitting_plans(self.setting) if plans is None else plans,

@@ -30,8 +30,7 @@ class TimeOptimalParams:
         inner_loop: that the environment has; with ``"model"`` the first force reading tells the
             weight.
         observer_gain_per_s: L of the disturbance observer, 0 without one.
-        replans: whether a plan is made anew where it was lost, which takes tenths of seconds, and
-            CasADi.
+        replans: whether a plan is made anew where it was lost, which takes seconds, and CasADi.
         lost_m: off the plan by so much it is.
         patience_s: likewise, so long after its end.
     """

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from defmanip_gym.errors import GainError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.control.control_laws import limit_speed
 from defmanip_gym.theory.dynamics.chain import Array
@@ -45,6 +46,9 @@ class DisturbanceObserver:
         period_s: T.
         w_limit: largest |w| on each axis, m/s².
         max_speed_m_s: of the limiter behind it.
+
+    Raises:
+        GainError: the observer by itself would be unstable.
     """
 
     gain: float
@@ -56,6 +60,13 @@ class DisturbanceObserver:
         settle(self, "gain", require_non_negative, "1/s")
         for name in ("period_s", "w_limit", "max_speed_m_s"):
             settle(self, name, require_positive)
+        if self.gain * self.period_s >= 2.0:  # d[k+1] = (1 − L T) d[k] by itself
+            raise GainError(
+                "observer gain",
+                self.gain,
+                f"below 2/T = {2.0 / self.period_s:g} 1/s, for a spectral radius below 1",
+                "Lower it; loops around the observer and delays leave less.",
+            )
 
     def updated(
         self, memory: ObserverMemory, velocity_b: Array, heading: Array, yaw_rate: Array

@@ -9,6 +9,7 @@ position depends on where the base heads meanwhile. The base follows the grasp a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -22,11 +23,13 @@ from defmanip_gym.validation import require_items, require_whole
 HORIZON_BLOCKS = (1, 1, 2, 2, 3, 3, 4, 5, 6, 7, 8, 8, 10, 10, 10, 10, 10)
 
 _MOST_PERIODS = 1000
+_MOST_BLOCKS = 100
 
 
 def validated_blocks(name: str, blocks: object) -> tuple[int, ...]:
     """Return the periods of each block, or raise ParameterError."""
-    periods = require_items(name, blocks, int)
+    periods = require_items(name, blocks, Integral)
+    require_whole(f"len({name})", len(periods), 1, _MOST_BLOCKS)
     return tuple(require_whole(name, count, 1, _MOST_PERIODS) for count in periods)
 
 

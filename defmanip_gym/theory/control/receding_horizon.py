@@ -143,7 +143,8 @@ class HorizonProgram:
         off = start.courses[:, :, None] - theta[:, None, :]
         rows[:, 2 * swings :, :blocks] = self.prediction.velocity * np.cos(off)
         rows[:, 2 * swings :, blocks:-1] = self.prediction.velocity * np.sin(off)
-        free = start.swing @ self._swing_free.T
+        # not by BLAS, whose last bits depend on the number of episodes
+        free = np.einsum("rf,nf->nr", self._swing_free, start.swing)
         along = np.cos(start.courses) * velocity[:, :1] + np.sin(start.courses) * velocity[:, 1:]
         limit = np.maximum(start.speed_limit, np.hypot(velocity[:, 0], velocity[:, 1]) + _TINY)
         bounds = (self.sigma_rad - free, self.sigma_rad + free, limit[:, None] - along)

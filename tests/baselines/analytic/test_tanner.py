@@ -149,3 +149,9 @@ def test_its_factory_finds_gains_for_beams_of_several_segments(segments):
 
 def test_its_factory_takes_the_tuned_gains_for_a_rod():
     assert make_controller(TransportConfig()).params == TannerParams()
+
+
+@pytest.mark.parametrize("name", ["bound_share", "deceleration_share", "speed_share"])
+def test_no_share_is_more_than_a_certificate_has(name):
+    with pytest.raises(ParameterError, match=name):
+        TannerParams(**{name: 1.2})

@@ -153,3 +153,12 @@ def test_payloads_of_another_mass_arrive_all_the_same():
 def test_several_segments_are_refused():
     with pytest.raises(ParameterError, match="rigid rods"):
         TimeOptimalController(beam=BeamParams(segment_count=2))
+
+
+def test_arguments_may_be_mappings_and_others_are_refused():
+    made = TimeOptimalController(params={"lost_m": 0.3})
+    assert made.params == TimeOptimalParams(lost_m=0.3)
+    with pytest.raises(ParameterError, match="params"):
+        TimeOptimalController(params=5)
+    with pytest.raises(ParameterError, match="plans"):
+        TimeOptimalController(plans=5)

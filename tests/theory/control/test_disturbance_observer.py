@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from defmanip_gym.errors import GainError
 from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
 from defmanip_gym.theory.control.disturbance_observer import (
     DisturbanceObserver,
@@ -56,3 +59,9 @@ def test_the_first_reading_tells_what_another_weight_will_do():
     inertia = task_inertia(RobotParams(), pitch)[0] + np.diag((0.0, 0.0, carried.mass_kg))
     missing = (believed.mass_kg - carried.mass_kg) * GRAVITY_M_S2
     np.testing.assert_allclose(inertia @ found[0], [0.0, 0.0, missing], atol=1e-12)
+
+
+def test_a_gain_with_which_the_estimate_grows_by_itself_is_refused():
+    with pytest.raises(GainError, match="100 1/s"):
+        replace(OBSERVER, gain=2.0 / PERIOD_S)
+    replace(OBSERVER, gain=1.99 / PERIOD_S)

@@ -43,3 +43,10 @@ def test_blocks_are_whole_periods():
     assert validated_blocks("blocks", [1, 2]) == (1, 2)
     with pytest.raises(ParameterError, match="blocks"):
         validated_blocks("blocks", (1, 0))
+
+
+def test_a_horizon_has_some_blocks_but_not_any_number_and_numpy_counts():
+    assert validated_blocks("blocks", [np.int64(1), 2]) == (1, 2)
+    for wrong in ((), (1,) * 1000, (True, 2), (1.0, 2), 5):
+        with pytest.raises(ParameterError, match="blocks"):
+            validated_blocks("blocks", wrong)
