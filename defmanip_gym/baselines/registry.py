@@ -49,13 +49,20 @@ class BoundedFactory(Protocol):
 
 
 def registered_controllers() -> dict[str, str]:
-    """Return ``module:factory`` by name, of all installed packages, in alphabetical order."""
+    """Return ``module:factory`` by name, of all installed packages, in alphabetical order.
+
+    Raises:
+        ControllerError: two packages give one name to different factories.
+    """
     # all descriptions of a package count: one that a build left in the checkout may be out of date
-    found = {
-        point.name: point.value
-        for package in distributions()
-        for point in package.entry_points.select(group=CONTROLLER_GROUP)
-    }
+    found: dict[str, str] = {}
+    owners: dict[str, str] = {}
+    for package in distributions():
+        for point in package.entry_points.select(group=CONTROLLER_GROUP):
+            owner = owners.setdefault(point.name, package.name)
+            if found.setdefault(point.name, point.value) != point.value and owner != package.name:
+                both = f"{found[point.name]} and {point.value}"
+                raise _unusable(f"{point.name!r}: {both}", "one for each name", "Rename one.")
     return dict(sorted(found.items()))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from defmanip_gym.baselines.learned.agents import load_family, shipped_families
 from defmanip_gym.baselines.registry import (
@@ -30,7 +30,11 @@ def standard_names() -> tuple[str, ...]:
 
     Controllers that need a package that is not installed are left out; asked for, they say which.
     """
-    analytic = (n for name in available_controllers() for n in _shown_controller(name))
+    return _standard_names_of(available_controllers())
+
+
+def _standard_names_of(controllers: Iterable[str]) -> tuple[str, ...]:
+    analytic = (n for name in controllers for n in _shown_controller(name))
     return ("zero", "random", *analytic, *(n for f in shipped_families() for n in _shown(f)))
 
 
@@ -58,10 +62,11 @@ def known_names() -> tuple[str, ...]:
 
     Any ``module:factory`` can be, too, alone or inside a filter.
     """
-    families = shipped_families()
-    bases = (*registered_controllers(), *families, *(f + OTHER_INNER_LOOP for f in families))
+    # none is made here: one that somebody's package cannot make is no obstacle to the others
+    families, registered = shipped_families(), registered_controllers()
+    bases = (*registered, *families, *(f + OTHER_INNER_LOOP for f in families))
     every = (name for base in bases for name in (base, *(f"{base}/{o}" for o in OPTIONS)))
-    return tuple(dict.fromkeys((*standard_names(), *every)))
+    return tuple(dict.fromkeys((*_standard_names_of(registered), *every)))
 
 
 def standard_contestants(

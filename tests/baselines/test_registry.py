@@ -16,6 +16,8 @@ from defmanip_gym.baselines.registry import (
 )
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ControllerError
+from defmanip_gym.evaluation.contestants import known_names, standard_contestants
+from defmanip_gym.evaluation.protection import Certificates
 
 MODULE = '''
 from defmanip_gym.baselines.controller import ZeroController
@@ -103,3 +105,30 @@ def test_an_identity_that_json_cannot_hold_is_refused():
 
     with pytest.raises(ControllerError, match="write arrays as lists"):
         identity_of("somebody:make", Unclear())
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """Install a package that registers a controller that cannot be made."""
+
+    def install(name):
+        described = tmp_path / "somebody-1.0.dist-info"
+        described.mkdir()
+        (described / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
+        registered = f"[defmanip_gym.controllers]\n{name} = nowhere:make\n"
+        (described / "entry_points.txt").write_text(registered)
+        monkeypatch.syspath_prepend(tmp_path)
+
+    return install
+
+
+def test_two_controllers_of_one_name_are_refused(installed):
+    installed("lqr")
+    with pytest.raises(ControllerError, match="nowhere:make"):
+        registered_controllers()
+
+
+def test_what_somebodys_package_cannot_make_is_no_obstacle_to_others(installed):
+    installed("theirs")
+    (zero,) = standard_contestants(["zero"], Certificates())
+    assert zero.name == "zero" and "theirs" in known_names()

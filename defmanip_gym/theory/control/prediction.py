@@ -9,7 +9,6 @@ position depends on where the base heads meanwhile. The base follows the grasp a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 
 import numpy as np
 
@@ -28,7 +27,7 @@ _MOST_BLOCKS = 100
 
 def validated_blocks(name: str, blocks: object) -> tuple[int, ...]:
     """Return the periods of each block, or raise ParameterError."""
-    periods = require_items(name, blocks, Integral)
+    periods = require_items(name, blocks, object)
     require_whole(f"len({name})", len(periods), 1, _MOST_BLOCKS)
     return tuple(require_whole(name, count, 1, _MOST_PERIODS) for count in periods)
 
