@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import load_agent, load_family, shipped_families
 from defmanip_gym.baselines.registry import available_controllers, registered_controllers
+from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import AgentFileError, ParameterError
 from defmanip_gym.evaluation import protection
 from defmanip_gym.evaluation.contestants import (
@@ -103,9 +105,11 @@ def test_a_learned_contestant_has_a_member_for_each_seed(everyone):
 
 
 def test_whatever_a_job_needs_can_be_pickled(everyone):
+    env = gymnasium.make_vec(ENV_ID, num_envs=2)
+    observation, _ = env.reset(options={"start": "paper"})  # from where plans are stored
+    env.close()
     for contestant in everyone:
         again = pickle.loads(pickle.dumps(contestant))
-        observation = np.zeros((2, SIZE))
         actions, copied = (
             each.members[0].controller.build([1, 2]).predict(observation)[0]
             for each in (contestant, again)
