@@ -153,12 +153,14 @@ class PaperLoop:
         return np.full((1, 3), push)
 
     def _sample(self, plant: PlantState, observation: Array) -> GraspSample:
+        velocity_b = self._layout.part(observation, "grasp_velocity_b")
         return GraspSample(
             position=position_from_goal(observation, self._layout),
             heading=heading_error(observation, self._layout),
-            velocity_b=self._layout.part(observation, "grasp_velocity_b"),
+            velocity_b=velocity_b,
             yaw_rate=plant.base_velocity[:, 1],
             reach=self._kinematics.reach_and_height(plant.joints @ JOINT_TO_PITCH.T)[:, 0],
+            reach_rate=velocity_b[:, 0] - plant.base_velocity[:, 0],
             swing=plant.swing,
             swing_rate=plant.swing_rate,
             force_b=plant.grasp_force_b,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gymnasium
 import numpy as np
 
+from defmanip_gym.baselines.analytic.grasp_sample import grasp_sample
 from defmanip_gym.baselines.analytic.planner_state import planner_states
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.planning.forces import force_shares
@@ -21,7 +22,7 @@ def test_the_model_foresees_a_second_of_the_plant():
     layout, arm = ObservationLayout(1), ArmKinematics(setting.robot)
     task = setting.task
     generator = np.random.default_rng(0)
-    state = planner_states(observation[None], layout, arm)
+    state = planner_states(grasp_sample(observation[None], layout, arm))
     largest = np.zeros(11)
     for k in range(50):
         if k % 10 == 0:
@@ -30,7 +31,7 @@ def test_the_model_foresees_a_second_of_the_plant():
             setting.model, state, task.max_acceleration_m_s2 * action[None], task.control_period_s
         )
         observation, *_ = env.step(action)
-        error = np.abs(planner_states(observation[None], layout, arm) - state)[0]
+        error = np.abs(planner_states(grasp_sample(observation[None], layout, arm)) - state)[0]
         largest = np.maximum(largest, error)
     env.close()
     assert largest[:3].max() < 0.02

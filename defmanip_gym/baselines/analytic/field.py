@@ -14,7 +14,7 @@ import numpy as np
 
 from defmanip_gym.baselines.analytic.field_tracking import FieldTracking
 from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
-from defmanip_gym.baselines.analytic.law_params import LawParams
+from defmanip_gym.baselines.analytic.law_params import WayLawParams
 from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.envs.config import TransportConfig
@@ -33,7 +33,7 @@ from defmanip_gym.validation import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class FieldParams(LawParams):
+class FieldParams(WayLawParams):
     """Design choices of ``field``; with the inner loop ``"model"`` it weighs the object first.
 
     The defaults are what a study found (docs/training.md).
@@ -95,6 +95,7 @@ class FieldController(SampledLaw):
     ) -> None:
         params = FieldParams() if params is None else require_params("params", params, FieldParams)
         super().__init__(beam=beam, robot=robot, task=task, params=params)
+        self.field = params.way.field(self.task, self.goal_reach_m)
         self._check_gains()
         bound = min(params.acceleration_bound, self.task.max_acceleration_m_s2)
         self.law = FieldTracking(

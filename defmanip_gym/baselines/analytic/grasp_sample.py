@@ -24,6 +24,7 @@ class GraspSample:
         velocity_b: ż1 in the base frame, (n, 3) m/s.
         yaw_rate: u2, (n,) rad/s.
         reach: ρ, (n,) m.
+        reach_rate: ρ̇, (n,) m/s: what the grasp has forward of the base's velocity.
         swing: φ, (n, N) rad.
         swing_rate: φ̇, (n, N) rad/s.
         force_b: f̃, the measured force on the object in the base frame, (n, 3) N.
@@ -34,6 +35,7 @@ class GraspSample:
     velocity_b: Array
     yaw_rate: Array
     reach: Array
+    reach_rate: Array
     swing: Array
     swing_rate: Array
     force_b: Array
@@ -55,12 +57,14 @@ def grasp_sample(
 
     heading = np.arctan2(part("heading")[:, 0], part("heading")[:, 1])
     pitch = part("joints") @ JOINT_TO_PITCH.T
+    velocity_b = part("grasp_velocity_b")
     return GraspSample(
         position=base_to_world(-part("goal_offset_b"), heading),
         heading=heading,
-        velocity_b=part("grasp_velocity_b"),
+        velocity_b=velocity_b,
         yaw_rate=part("base_velocity")[:, 1],
         reach=kinematics.reach_and_height(pitch)[:, 0],
+        reach_rate=velocity_b[:, 0] - part("base_velocity")[:, 0],
         swing=part("swing"),
         swing_rate=part("swing_rate"),
         force_b=part("grasp_force_b"),

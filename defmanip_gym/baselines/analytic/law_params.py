@@ -17,15 +17,27 @@ class LawParams:
     Attributes:
         inner_loop: that the environment is to have. The one that measures the grasp force needs no
             weight of the object.
-        way: to the goal.
         observer_gain_per_s: L of the disturbance observer, 1/s; 0 leaves it at its first estimate.
     """
 
     inner_loop: InnerLoopKind = "measured_force"
-    way: WayParams = field(default_factory=WayParams)
     observer_gain_per_s: float = 10.0
 
     def __post_init__(self) -> None:
         require_choice("inner_loop", self.inner_loop, get_args(InnerLoopKind))
-        settle(self, "way", require_params, WayParams)
         settle(self, "observer_gain_per_s", require_non_negative, "1/s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WayLawParams(LawParams):
+    """Design choices of every law that is led by a velocity field.
+
+    Attributes:
+        way: to the goal.
+    """
+
+    way: WayParams = field(default_factory=WayParams)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        settle(self, "way", require_params, WayParams)

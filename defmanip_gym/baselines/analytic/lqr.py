@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
-from defmanip_gym.baselines.analytic.law_params import LawParams
+from defmanip_gym.baselines.analytic.law_params import WayLawParams
 from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.envs.config import TransportConfig
@@ -32,7 +32,7 @@ from defmanip_gym.validation import require_params, require_positive, settle
 
 
 @dataclass(frozen=True, kw_only=True)
-class LqrParams(LawParams):
+class LqrParams(WayLawParams):
     """Design choices of ``lqr``.
 
     Attributes:
@@ -82,6 +82,7 @@ class LqrController(SampledLaw):
     ) -> None:
         params = LqrParams() if params is None else require_params("params", params, LqrParams)
         super().__init__(beam=beam, robot=robot, task=task, params=params)
+        self.field = params.way.field(self.task, self.goal_reach_m)
         linear, period = linearize(self.beam), self.task.control_period_s
         self.forward_gains = forward_gains(linear, self.params.weights, period)
         self.side_gains = side_gains(self.params.weights, period)

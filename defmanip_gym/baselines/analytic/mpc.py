@@ -62,6 +62,7 @@ class MpcController(SampledLaw):
     ) -> None:
         params = MpcParams() if params is None else require_params("params", params, MpcParams)
         super().__init__(beam=beam, robot=robot, task=task, params=params)
+        self.field = params.way.field(self.task, self.goal_reach_m)
         self.limit = params.acceleration_share * self.task.max_acceleration_m_s2
         self.prediction = Prediction(
             linearize(self.beam), params.blocks, self.task.control_period_s

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from defmanip_gym.baselines.analytic.law_params import LawParams
+from defmanip_gym.baselines.analytic.law_params import WayLawParams
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.theory.control.horizon import HorizonWeights
 from defmanip_gym.theory.control.prediction import HORIZON_BLOCKS, validated_blocks
@@ -12,7 +12,7 @@ from defmanip_gym.validation import require_between, require_params, require_pos
 
 
 @dataclass(frozen=True, kw_only=True)
-class MpcParams(LawParams):
+class MpcParams(WayLawParams):
     """Design choices of ``mpc``.
 
     Attributes:

@@ -1,11 +1,10 @@
-"""What observations say of the planner's state."""
+"""What a sample says of the planner's state."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from defmanip_gym.baselines.analytic.grasp_sample import grasp_sample
-from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
 from defmanip_gym.planning.model import (
     HEADING,
     POSITION,
@@ -16,25 +15,13 @@ from defmanip_gym.planning.model import (
     VELOCITY,
     Array,
 )
-from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 
 
-def planner_states(
-    observation: Array, layout: ObservationLayout, kinematics: ArmKinematics
-) -> Array:
-    """Return states (n, 11) in the order of ``planning.model.STATE``.
-
-    Args:
-        observation: (n, size), of a beam of one segment.
-        layout: of the beam carried.
-        kinematics: of the arm that carries it.
-    """
-    now = grasp_sample(observation, layout, kinematics)
-    pitch = layout.part(observation, "joints") @ JOINT_TO_PITCH.T
-    pitch_rate = layout.part(observation, "joint_rates") @ JOINT_TO_PITCH.T
-    states = np.empty((len(observation), STATE_SIZE))
+def planner_states(now: GraspSample) -> Array:
+    """Return states (n, 11) in the order of ``planning.model.STATE``, of a beam of one segment."""
+    states = np.empty((len(now.heading), STATE_SIZE))
     states[:, POSITION], states[:, HEADING] = now.position, now.heading
-    states[:, VELOCITY], states[:, REACH] = now.velocity_b, now.reach
-    states[:, REACH_RATE] = (kinematics.jacobian(pitch)[:, 0] * pitch_rate).sum(axis=1)
+    states[:, VELOCITY] = now.velocity_b
+    states[:, REACH], states[:, REACH_RATE] = now.reach, now.reach_rate
     states[:, SWING:] = np.hstack((now.swing, now.swing_rate))
     return states

@@ -29,7 +29,7 @@ from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinemati
 from defmanip_gym.validation import plain, require_params
 
 Array = NDArray[np.float64]
-Memory = tuple[Array, ...]
+Memory = tuple[NDArray[Any], ...]
 
 
 class SampledLaw(ABC):
@@ -59,8 +59,7 @@ class SampledLaw(ABC):
         self.layout = ObservationLayout(self.beam.segment_count)
         self.kinematics = ArmKinematics(self.robot)
         goal_pitch = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
-        goal_reach_m = float(self.kinematics.reach_and_height(goal_pitch)[0])
-        self.field = params.way.field(self.task, goal_reach_m)
+        self.goal_reach_m = float(self.kinematics.reach_and_height(goal_pitch)[0])
         self.observer = DisturbanceObserver(
             gain=params.observer_gain_per_s,
             period_s=self.task.control_period_s,
@@ -125,7 +124,7 @@ class SampledLaw(ABC):
         return weight_disturbance(self.robot, self.beam, pitch, now.force_b), self.begin(now)
 
 
-def _restarted(going: Array, fresh: Array, starts: NDArray[np.bool_]) -> Array:
+def _restarted(going: NDArray[Any], fresh: NDArray[Any], starts: NDArray[np.bool_]) -> NDArray[Any]:
     """Return an array (n, ...) that goes on, and the fresh one of episodes that start, (n,)."""
     shape = (-1, *np.ones(fresh.ndim - 1, dtype=int))
     return np.where(np.atleast_1d(starts).reshape(shape), fresh, going)

@@ -14,7 +14,7 @@ from typing import get_args
 import numpy as np
 
 from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
-from defmanip_gym.baselines.analytic.law_params import LawParams
+from defmanip_gym.baselines.analytic.law_params import WayLawParams
 from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.envs.config import TransportConfig
@@ -33,7 +33,7 @@ from defmanip_gym.validation import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShapedParams(LawParams):
+class ShapedParams(WayLawParams):
     """Design choices of ``shaped``.
 
     Attributes:
@@ -94,6 +94,7 @@ class ShapedController(SampledLaw):
             ShapedParams() if params is None else require_params("params", params, ShapedParams)
         )
         super().__init__(beam=beam, robot=robot, task=task, params=params)
+        self.field = params.way.field(self.task, self.goal_reach_m)
         self.weights = shaper(
             *slowest_swing(linearize(self.beam)), self.task.control_period_s, self.params.shaper
         )

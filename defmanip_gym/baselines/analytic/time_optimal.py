@@ -1,47 +1,37 @@
-"""Plans the quickest motion from where an episode begins, and follows it.
+"""``time_optimal``: plans the quickest motion from where an episode begins, and follows it.
 
-The plan is the optimal control problem's answer with margins (``planning``), taken from the stored
-ones where the start is known, which is planning offline, and solved for where it is not. It is
-followed by linear-quadratic regulation about it, and held at the goal by the same law.
+The plan is the optimal control problem's answer with margins (``planning``; J. T. Betts, "Practical
+Methods for Optimal Control Using Nonlinear Programming", SIAM 2010), taken from the stored ones
+where the start is known, which is planning offline, and solved for where it is not. It is followed
+by linear-quadratic regulation about it, and held at the goal by the same law.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from defmanip_gym.baselines.analytic.grasp_sample import GraspSample
 from defmanip_gym.baselines.analytic.planner_state import planner_states
+from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.baselines.analytic.time_optimal_params import TimeOptimalParams
-from defmanip_gym.baselines.controller import State
-from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
-from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.planning.following import Following
-from defmanip_gym.planning.model import HEADING, REACH, VELOCITY, Array
 from defmanip_gym.planning.setting import PlanningSetting
 from defmanip_gym.planning.stored import StoredPlans
 from defmanip_gym.planning.tracking import holding_gain
 from defmanip_gym.planning.tracks import Tracks, fitting_plans
 from defmanip_gym.task_params import TaskParams
-from defmanip_gym.theory.control.disturbance_observer import (
-    DisturbanceObserver,
-    ObserverMemory,
-    weight_disturbance,
-)
-from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_instance, require_params
 
-BoolArray = NDArray[np.bool_]
 
-
-class TimeOptimalController:
+class TimeOptimalController(SampledLaw):
     """Plans at the beginning of each episode, then follows.
 
-    Its state holds where each episode's plan begins, (n, 11), and how many samples ago, (n,). Plans
+    It remembers where each episode's plan begins, (n, 11), and how many samples ago, (n,). Plans
     and gains follow from that alone, and are made once for each.
 
     Args:
@@ -62,6 +52,7 @@ class TimeOptimalController:
     """
 
     knows = "nominal robot and beam; plans made beforehand for the suites' starts"
+    params: TimeOptimalParams
 
     def __init__(
         self,
@@ -73,14 +64,12 @@ class TimeOptimalController:
         params: TimeOptimalParams | None = None,
         plans: StoredPlans | None = None,
     ) -> None:
-        self.setting = PlanningSetting(
-            beam=BeamParams() if beam is None else beam,
-            robot=RobotParams() if robot is None else robot,
-            task=TaskParams() if task is None else task,
-            sigma_rad=sigma_rad,
-        )
         given = TimeOptimalParams() if params is None else params
-        self.params = params = require_params("params", given, TimeOptimalParams)
+        params = require_params("params", given, TimeOptimalParams)
+        super().__init__(beam=beam, robot=robot, task=task, params=params)
+        self.setting = PlanningSetting(
+            beam=self.beam, robot=self.robot, task=self.task, sigma_rad=sigma_rad
+        )
         if plans is not None:
             require_instance("plans", plans, StoredPlans)
         self.tracks = Tracks(
@@ -90,15 +79,7 @@ class TimeOptimalController:
             search=params.search,
             weights=params.weights,
         )
-        self.layout = ObservationLayout(1)
-        self.kinematics = ArmKinematics(self.setting.robot)
-        period_s = self.setting.task.control_period_s
-        self._observer = DisturbanceObserver(
-            gain=params.observer_gain_per_s,
-            period_s=period_s,
-            w_limit=self.setting.task.max_acceleration_m_s2,
-            max_speed_m_s=self.setting.task.max_speed_m_s,
-        )
+        period_s = self.task.control_period_s
         self.following = Following(
             tracks=self.tracks,
             hold=holding_gain(self.setting.model, period_s, params.weights),
@@ -106,72 +87,29 @@ class TimeOptimalController:
             patience_samples=params.patience_s / period_s,
         )
 
-    def predict(
-        self,
-        observation: Array,
-        state: State | None = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = False,
-    ) -> tuple[Array, State | None]:
-        """Return w / a_max and (where plans begin, samples since then, the observer's memory).
+    def begin(self, now: GraspSample) -> Memory:
+        """Return where plans begin, here, and that this is their first sample."""
+        return planner_states(now), np.zeros(len(now.heading), dtype=np.int64)
+
+    def command(self, now: GraspSample, memory: Memory) -> tuple[Array, Memory]:
+        """Return the plans' accelerations with feedback, (n, 3) m/s².
 
         Raises:
             InstallationError: a start that no stored plan is for, and CasADi is not installed.
             ParameterError: a start without plan.
         """
-        batch = np.atleast_2d(observation)
-        states = planner_states(batch, self.layout, self.kinematics)
-        origins, steps = states, np.zeros(len(states), dtype=np.int64)
-        disturbance = self._first_disturbance(batch)
-        if state is not None:
-            goes_on = np.ones(len(states), dtype=bool)
-            if episode_start is not None:
-                goes_on = ~np.atleast_1d(episode_start)
-            origins = np.where(goes_on[:, None], state[0], states)
-            steps = np.where(goes_on, state[1], 0)
-            memory = ObserverMemory(estimate=state[2], w=state[3], velocity=state[4])
-            observed = self._observed(states, memory)
-            disturbance = np.where(goes_on[:, None], observed, disturbance)
+        states, (origins, steps) = planner_states(now), memory
         if self.params.replans:
             lost = self.following.lost(states, origins, steps)
             origins = np.where(lost[:, None], states, origins)
             steps = np.where(lost, 0, steps)
-        memory = self._observer.command(
-            self.following.commands(states, origins, steps),
-            disturbance,
-            states[:, VELOCITY],
-            states[:, HEADING],
-        )
-        action = np.clip(memory.w / self.setting.task.max_acceleration_m_s2, -1.0, 1.0)
-        remembered = (origins, steps + 1, memory.estimate, memory.w, memory.velocity)
-        return action.reshape(*np.shape(observation)[:-1], 3), remembered
-
-    @property
-    def inner_loop(self) -> InnerLoopKind:
-        """The inner loop that the environment is to have."""
-        return self.params.inner_loop
+        return self.following.commands(states, origins, steps), (origins, steps + 1)
 
     @property
     def identity(self) -> dict[str, Any]:
         """What its behaviour depends on, as JSON values."""
-        return {
-            "setting": asdict(self.setting),
-            "params": asdict(self.params),
-            "plans": self.tracks.stored.digest,
-        }
-
-    def _first_disturbance(self, batch: Array) -> Array:
-        """Return what is expected before anything was observed, (n, 3) m/s²."""
-        if self.params.inner_loop == "measured_force":
-            return np.zeros((len(batch), 3))
-        pitch = self.layout.part(batch, "joints") @ JOINT_TO_PITCH.T
-        force = self.layout.part(batch, "grasp_force_b")
-        return weight_disturbance(self.setting.robot, self.setting.beam, pitch, force)
-
-    def _observed(self, states: Array, memory: ObserverMemory) -> Array:
-        """Return the observer's estimate of this sample, (n, 3) m/s²."""
-        yaw_rate = states[:, VELOCITY][:, 1] / states[:, REACH]
-        return self._observer.updated(memory, states[:, VELOCITY], states[:, HEADING], yaw_rate)
+        more = {"sigma_rad": self.setting.sigma_rad, "plans": self.tracks.stored.digest}
+        return super().identity | more
 
 
 def make_controller(config: TransportConfig) -> TimeOptimalController:
