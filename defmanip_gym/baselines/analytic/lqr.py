@@ -33,7 +33,7 @@ from defmanip_gym.validation import require_params, require_positive, settle
 
 @dataclass(frozen=True, kw_only=True)
 class LqrParams(WayLawParams):
-    """Design choices of ``lqr``.
+    """Design choices of ``lqr``; with ``LqrWeights``' they are what a study found.
 
     Attributes:
         weights: of the regulators' errors.
@@ -44,12 +44,14 @@ class LqrParams(WayLawParams):
     weights: LqrWeights = field(default_factory=LqrWeights)
     way: WayParams = field(
         default_factory=lambda: WayParams(
-            deceleration_m_s2=1.9,
-            vertical_deceleration_m_s2=0.36,
-            approach_rate_per_s=2.35,
+            turn_radius_m=4.2,
+            yaw_rate_rad_s=1.85,
+            deceleration_m_s2=2.54,
+            vertical_deceleration_m_s2=0.72,
+            approach_rate_per_s=3.3,
         )
     )
-    acceleration_m_s2: float = 2.8
+    acceleration_m_s2: float = 2.55
 
     def __post_init__(self) -> None:
         super().__post_init__()

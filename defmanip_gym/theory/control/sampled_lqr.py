@@ -31,10 +31,10 @@ class LqrWeights:
         swing_rate: per (rad/s)².
     """
 
-    position: float = 54.0
-    velocity: float = 0.13
-    swing: float = 117.0
-    swing_rate: float = 0.08
+    position: float = 4.4
+    velocity: float = 0.85
+    swing: float = 15.4
+    swing_rate: float = 0.165
 
     def __post_init__(self) -> None:
         settle(self, "position", require_positive)
