@@ -1,4 +1,4 @@
-"""What a residual policy trains in: its actions correct the paper's controller in a certificate."""
+"""What a residual policy trains in: its actions correct a controller, inside a protection."""
 
 from __future__ import annotations
 
@@ -14,16 +14,12 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import State
 from defmanip_gym.baselines.residual import corrected, required_periods
-from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.baselines.residual_base import PAPERS, residual_base
 from defmanip_gym.errors import ParameterError
-from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 from defmanip_gym.validation import require_positive
 from defmanip_gym.wrappers.actions import finite_actions
-from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling, NuMaxVectorActionScaling
-from defmanip_gym.wrappers.transport import transport_config
 
 if TYPE_CHECKING:
     from defmanip_gym.envs.vector import DeformTransportVectorEnv
@@ -31,19 +27,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _ENDINGS = ("final_obs", "final_info", "_final_obs", "_final_info")
-
-
-def residual_authority(
-    certificate: Certificate, config: TransportConfig, authority: float
-) -> float:
-    """Return the largest correction of a normalized action, ``authority`` certified accelerations.
-
-    Raises:
-        ParameterError: an authority that is not positive.
-    """
-    authority = require_positive("authority", authority)
-    limit = config.task.max_acceleration_m_s2
-    return min(authority * certificate.acceleration_bound / limit, 1.0)
 
 
 class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
@@ -54,13 +37,13 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
 
     Args:
         env: a batched DeformTransport environment in task mode.
-        certificate: method that computes what base controller and wrapper keep to.
+        inside: as for ``residual_base``, whatever the sum stays inside.
         decision_periods: control periods that an action is held for.
-        authority: largest correction, in units of the certified acceleration; above 1 a residual
-            can outweigh the controller.
+        authority: largest correction, as for ``residual_base``.
+        base: registered controller that is corrected.
 
     Raises:
-        CertificateError: there is no such certificate for the environment's beam.
+        CertificateError: there is no such certificate or filter for the environment.
         ParameterError: the environment resets in another way, or no whole number of periods.
     """
 
@@ -69,9 +52,10 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
     def __init__(
         self,
         env: gymnasium.vector.VectorEnv[Any, Any, Any],
-        certificate: str = "phase_plane",
+        inside: str = "phase_plane",
         decision_periods: int = 1,
         authority: float = 1.0,
+        base: str = PAPERS,
     ) -> None:
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
@@ -82,10 +66,10 @@ class ResidualVectorAction(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, An
                 "Make the batch by make_vec(..., autoreset_mode='SameStep').",
             )
         decision_periods = required_periods(decision_periods)
-        base, bound = _base_and_certificate(env, certificate)
-        super().__init__(NuMaxVectorActionScaling(env, bound))
-        self._base, self._decision_periods = base, decision_periods
-        self._authority = residual_authority(bound, transport_config(env), authority)
+        below = residual_base(env, base=base, inside=inside, authority=authority)
+        super().__init__(below.around_batch(env))
+        self._base, self._decision_periods = below.controller, decision_periods
+        self._authority = below.authority
         self._state: State | None = None
         self._action: Array | None = None
 
@@ -170,23 +154,22 @@ def _keep(last: dict[str, Any], info: dict[str, Any], fresh: NDArray[np.bool_]) 
 class ResidualAction(
     gymnasium.Wrapper[Array, Array, Array, Array], gymnasium.utils.RecordConstructorArgs
 ):
-    """Makes the action a correction of the paper's controller, and certifies the sum.
+    """Makes the action a correction of a controller's, and keeps the sum inside a protection.
 
-    The controller knows the environment's robot and beam and keeps to the certificate's bounds. An
-    action adds up to ``authority`` times the certified acceleration to each axis of its command,
-    and :class:`~defmanip_gym.wrappers.nu_max_scaling.NuMaxActionScaling` brings the sum back into
-    the certificate. An action is held for some control periods, in which rewards and costs add up:
-    the controller's own feedback hides what a correction of a single period does.
+    The controller knows the environment's robot and beam. An action adds to each axis of its
+    command, and a safety filter, or a certificate's bound, brings the sum back to what is allowed.
+    An action is held for some control periods, in which rewards and costs add up: the controller's
+    own feedback hides what a correction of a single period does.
 
     Args:
         env: a DeformTransport environment in task mode.
-        certificate: method that computes what base controller and wrapper keep to.
+        inside: as for ``residual_base``, whatever the sum stays inside.
         decision_periods: control periods that an action is held for.
-        authority: largest correction, in units of the certified acceleration; above 1 a residual
-            can outweigh the controller.
+        authority: largest correction, as for ``residual_base``.
+        base: registered controller that is corrected.
 
     Raises:
-        CertificateError: there is no such certificate for the environment's beam.
+        CertificateError: there is no such certificate or filter for the environment.
         ParameterError: no whole number of periods.
     """
 
@@ -196,25 +179,30 @@ class ResidualAction(
     def __init__(
         self,
         env: gymnasium.Env[Array, Array],
-        certificate: str = "phase_plane",
+        inside: str = "phase_plane",
         decision_periods: int = 1,
         authority: float = 1.0,
+        base: str = PAPERS,
     ) -> None:
         decision_periods = required_periods(decision_periods)
         authority = require_positive("authority", authority)
         gymnasium.utils.RecordConstructorArgs.__init__(
-            self, certificate=certificate, decision_periods=decision_periods, authority=authority
+            self,
+            inside=inside,
+            decision_periods=decision_periods,
+            authority=authority,
+            base=base,
         )
-        base, bound = _base_and_certificate(env, certificate)
-        super().__init__(NuMaxActionScaling(env, bound))
-        self._base, self._decision_periods = base, decision_periods
-        self._authority = residual_authority(bound, transport_config(env), authority)
+        below = residual_base(env, base=base, inside=inside, authority=authority)
+        super().__init__(below.around(env))
+        self._base, self._decision_periods = below.controller, decision_periods
+        self._authority = below.authority
         self._state: State | None = None
         self._action: Array | None = None
 
     @property
     def spec(self) -> EnvSpec | None:  # type: ignore[override]
-        """How to make it again; the certificate's wrapper comes with it."""
+        """How to make it again; the protection's wrapper comes with it."""
         spec = copy.deepcopy(self.env.env.spec)  # type: ignore[attr-defined]
         if spec is not None:
             spec.additional_wrappers += (self.wrapper_spec(**self._saved_kwargs),)
@@ -248,18 +236,3 @@ class ResidualAction(
             if terminated or truncated:
                 break
         return observation, total, terminated, truncated, info | {"cost": cost}
-
-
-def _base_and_certificate(env: Any, method: str) -> tuple[TannerController, Certificate]:
-    config = transport_config(env)
-    certificate = certify(
-        config.beam, sigma_rad=config.sigma_rad, method=method, conditions=TRANSPORT_CONDITIONS
-    )
-    controller = TannerController(
-        beam=config.beam,
-        robot=config.believed_robot,
-        task=config.task,
-        certificate=certificate,
-        params=GENTLE_PARAMS,
-    )
-    return controller, certificate

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium
 
 from defmanip_gym.params import BeamParams, BeamRanges
@@ -22,12 +24,18 @@ def randomized_ranges() -> BeamRanges:
     return BeamRanges(damping=RANDOMIZED_DAMPING, mass_kg=(low * mass_kg, high * mass_kg))
 
 
+def environment_arguments(env_id: str) -> dict[str, Any]:
+    """Return the arguments that an id gives its environment, of one of ``ENV_IDS``."""
+    return _arguments()[env_id]
+
+
+def _arguments() -> dict[str, dict[str, Any]]:
+    return {ENV_ID: {}, RANDOMIZED_ENV_ID: {"beam_ranges": randomized_ranges()}}
+
+
 def register_environments() -> None:
     """Register every environment of the package; calling it again changes nothing."""
-    for env_id, kwargs in (
-        (ENV_ID, {}),
-        (RANDOMIZED_ENV_ID, {"beam_ranges": randomized_ranges()}),
-    ):
+    for env_id, kwargs in _arguments().items():
         if env_id not in gymnasium.registry:
             gymnasium.register(
                 id=env_id,

@@ -11,6 +11,7 @@ import numpy as np
 
 from defmanip_gym.baselines.learned.actor import TENSOR_SUFFIX, MlpActor
 from defmanip_gym.baselines.learned.card import AgentCard, SuiteScore
+from defmanip_gym.baselines.learned.deployment import training_config
 from defmanip_gym.baselines.learned.families import (
     SHIPPED,
     load_family,
@@ -119,7 +120,8 @@ def _scores(
 ) -> dict[str, SuiteScore]:
     """Return an agent's scores by suite, empty if it did not take part."""
     card, folder = actor.card, RecordFolder(results / RECORD_FOLDER)
-    protection = protection_named(card.trained_inside or "", certificates)
+    inner_loop = training_config(card).inner_loop
+    protection = protection_named(card.trained_inside or "", certificates, inner_loop)
     is_residual = card.residual_authority_m_s2 is not None
     controller = Learned(actor, protection.certificate if is_residual and protection else None)
     scores = {}
@@ -130,7 +132,7 @@ def _scores(
             family="learned",
             member=str(card.seed),
         )
-        records = folder.read(entry, job_fingerprint(suite, controller, protection))
+        records = folder.read(entry, job_fingerprint(suite, controller, protection, inner_loop))
         if records:
             scores[suite.name] = suite_score(records)
     return scores

@@ -14,8 +14,14 @@ from defmanip_gym.evaluation.analytic_contestants import controller_contestant
 from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Random, Zero
 from defmanip_gym.evaluation.entry import SOLE_MEMBER
-from defmanip_gym.evaluation.learned_contestants import family_contestant
-from defmanip_gym.evaluation.options import CERTIFICATES, FILTER_OPTION, OPTIONS, OTHER_INNER_LOOP
+from defmanip_gym.evaluation.learned_contestants import family_contestant, inner_loop_of_family
+from defmanip_gym.evaluation.options import (
+    CERTIFICATES,
+    FILTER_OPTION,
+    INNER_LOOP_MARK,
+    OPTIONS,
+    OTHER_INNER_LOOP,
+)
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 from defmanip_gym.validation import require_choice
@@ -54,7 +60,13 @@ def _shown(family: str) -> tuple[str, ...]:
         (FILTER_OPTION,) if trained_in in (None, FILTER_OPTION) else (FILTER_OPTION, trained_in)
     )
     inside = (f"{family}/{option}" for option in options)
-    return (family, *inside, f"{family}{OTHER_INNER_LOOP}/{FILTER_OPTION}")
+    return (family, *inside, *(f"{other}/{FILTER_OPTION}" for other in _on_the_other(family)))
+
+
+def _on_the_other(family: str) -> tuple[str, ...]:
+    """Return a family's name on the inner loop that feels the load, if it did not learn on it."""
+    learned_on = f"{INNER_LOOP_MARK}{inner_loop_of_family(family)}"
+    return () if learned_on == OTHER_INNER_LOOP else (family + OTHER_INNER_LOOP,)
 
 
 def known_names() -> tuple[str, ...]:
@@ -64,7 +76,7 @@ def known_names() -> tuple[str, ...]:
     """
     # none is made here: one that somebody's package cannot make is no obstacle to the others
     families, registered = shipped_families(), registered_controllers()
-    bases = (*registered, *families, *(f + OTHER_INNER_LOOP for f in families))
+    bases = (*registered, *families, *(other for f in families for other in _on_the_other(f)))
     every = (name for base in bases for name in (base, *(f"{base}/{o}" for o in OPTIONS)))
     return tuple(dict.fromkeys((*_standard_names_of(registered), *every)))
 

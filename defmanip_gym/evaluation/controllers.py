@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS
 from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
 from defmanip_gym.baselines.learned.actor import MlpActor
-from defmanip_gym.baselines.learned.agents import controller_of
+from defmanip_gym.baselines.learned.deployment import controller_of, corrected_by
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.baselines.registry import identity_of, make_controller
 from defmanip_gym.errors import AgentFileError
@@ -115,6 +115,8 @@ class Learned:
         base = None
         if self.certificate is not None:
             base = {"params": asdict(GENTLE_PARAMS), "certificate": asdict(self.certificate)}
+        elif (below := corrected_by(self.actor)) is not None:
+            base = identity_of(self.actor.card.residual_base, below)
         return {"controller": self.actor.digest, "base": base}
 
 

@@ -10,6 +10,7 @@ from typing import cast
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.agents import is_sb3_zip, load_agent, load_family
 from defmanip_gym.baselines.learned.card import AgentCard
+from defmanip_gym.baselines.learned.deployment import training_config
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
 from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.errors import AgentFileError
@@ -51,21 +52,21 @@ def family_contestant(
         AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
     base, _, method = name.partition("/")
-    family, _, inner_loop = base.partition(INNER_LOOP_MARK)
+    family, _, other = base.partition(INNER_LOOP_MARK)
     actors = load_family(family)[:member_limit]
     about = f"Agents of the shipped family {family}, trained with {len(actors)} seeds"
     colour = contestant_colour(base, method)
-    contestant = _learned(name, actors, method, about, colour, certificates)
-    if not inner_loop:
+    inner_loop = cast(InnerLoopKind, other) if other else inner_loop_of_family(family)
+    contestant = _learned(name, actors, method, about, colour, certificates, inner_loop)
+    if not other:
         return contestant
-    kind = cast(InnerLoopKind, inner_loop)
-    return replace(
-        contestant,
-        description=f"{contestant.description[:-1]}, on the inner loop {kind!r}.",
-        privileged="; ".join((contestant.privileged, *known_below(kind))),
-        protection=protection_named(method, certificates, kind),
-        inner_loop=kind,
-    )
+    description = f"{contestant.description[:-1]}, on the inner loop {other!r}."
+    return replace(contestant, description=description)
+
+
+def inner_loop_of_family(family: str) -> InnerLoopKind:
+    """Return the inner loop that a shipped family was trained on."""
+    return training_config(load_family(family)[0].card).inner_loop
 
 
 def agent_contestants(
@@ -98,9 +99,11 @@ def agent_contestants(
     folder = path.resolve() if path.is_dir() else path.resolve().parent
     name = f"{folder.name}@{actor.digest}"
     about = f"{actor.card.algorithm} agent made by `{actor.card.command}`"
-    plain = _learned(name, (actor,), "", about, GUEST_COLOURS[0], certificates)
+    kind = training_config(actor.card).inner_loop
+    plain = _learned(name, (actor,), "", about, GUEST_COLOURS[0], certificates, kind)
     option = f"{name}/{FILTER_OPTION}"
-    return plain, _learned(option, (actor,), FILTER_OPTION, about, GUEST_COLOURS[1], certificates)
+    colour = GUEST_COLOURS[1]
+    return plain, _learned(option, (actor,), FILTER_OPTION, about, colour, certificates, kind)
 
 
 def _sb3_contestants(
@@ -136,10 +139,11 @@ def _learned(
     about: str,
     colour: str,
     certificates: Certificates,
+    inner_loop: InnerLoopKind,
 ) -> Contestant:
     for actor in actors:
         _require_fit(name, actor.card.observation_size, actor.card.action_size)
-    protection = protection_named(method, certificates)
+    protection = protection_named(method, certificates, inner_loop)
     trained_in = actors[0].card.certificate
     is_residual = actors[0].card.residual_authority_m_s2 is not None
     # outside of a certificate the paper's controller under a residual still is the training's
@@ -149,7 +153,7 @@ def _learned(
     knows = [_seen_in_training(actors[0].card)]
     if is_residual:
         knows.append("the controller under it knows the nominal robot and beam")
-    knows += known_inside(method)
+    knows += (*known_inside(method), *known_below(inner_loop))
     return Contestant(
         name=name,
         family="learned",
@@ -164,6 +168,7 @@ def _learned(
             for actor in actors
         ),
         protection=protection,
+        inner_loop=inner_loop,
     )
 
 

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import gymnasium
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecNormalize
 
-from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.baselines.residual_base import shared_filter
 from defmanip_gym.errors import DefmanipError, ParameterError
 from defmanip_gym.evaluation.seeds import LARGEST_BATCH, VALIDATION_SEED
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
-from defmanip_gym.theory.filters.family import STORAGE_FILTERS
-from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.hyperparameters import built, components
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.validation import require_whole
-from defmanip_gym.wrappers.filter_for import filter_for
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
 from defmanip_gym.wrappers.transport import delay_periods, transport_config
@@ -83,15 +79,9 @@ def _sb3_env(config: TrainConfig, hyperparameters: dict[str, Any], num_envs: int
         )
         env = NuMaxVectorActionScaling(env, certificate)
     if config.filter is not None:
-        made = _filter(transport_config(env), config.filter, delay_periods(env))
+        made = shared_filter(transport_config(env), config.filter, delay_periods(env))
         env = SafetyFilterVectorWrapper(env, made)
     return Sb3VecEnv(env)
-
-
-@lru_cache(maxsize=4)
-def _filter(config: TransportConfig, name: str, delay: int) -> StorageFilter:
-    """Return the filter around a run's environments; training and evaluation share it."""
-    return filter_for(config, kind=STORAGE_FILTERS[name], delay_periods=delay)
 
 
 def _batched(wrapper: Any) -> Any:

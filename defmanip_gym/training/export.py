@@ -8,17 +8,22 @@ from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.card import AgentCard
-from defmanip_gym.baselines.residual_action import ResidualAction, residual_authority
+from defmanip_gym.baselines.residual_action import ResidualAction
+from defmanip_gym.baselines.residual_base import certified_authority, filter_authority
 from defmanip_gym.envs.config import TransportConfig
+from defmanip_gym.envs.state import wrappers
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 from defmanip_gym.training.hyperparameters import components
+from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
 
 _ACTIVATION_NAMES = {nn.Tanh: "tanh", nn.ReLU: "relu"}
 
@@ -60,9 +65,15 @@ def hidden_activation(model: BaseAlgorithm) -> str:
 class Residual:
     """How a residual policy acts, for its card."""
 
-    certificate: str
+    base: str
+    inside: str
     authority_m_s2: float
     decision_periods: int
+
+    @property
+    def certificate(self) -> str | None:
+        """The certificate that it stays inside, if it is one."""
+        return None if self.inside in STORAGE_FILTERS else self.inside
 
 
 def residual_of(hyperparameters: dict[str, Any]) -> Residual | None:
@@ -71,14 +82,32 @@ def residual_of(hyperparameters: dict[str, Any]) -> Residual | None:
         if wrapper is ResidualAction:
             settings = signature(ResidualAction).bind(None, **options)
             settings.apply_defaults()
-            method = settings.arguments["certificate"]
-            bound = certify(BeamParams(), method=method, conditions=TRANSPORT_CONDITIONS)
-            share = residual_authority(bound, TransportConfig(), settings.arguments["authority"])
+            inside, wished = settings.arguments["inside"], settings.arguments["authority"]
+            if inside in STORAGE_FILTERS:
+                share = filter_authority(wished)
+            else:
+                bound = certify(BeamParams(), method=inside, conditions=TRANSPORT_CONDITIONS)
+                share = certified_authority(bound, TransportConfig(), wished)
             return Residual(
-                certificate=method,
+                base=settings.arguments["base"],
+                inside=inside,
                 authority_m_s2=share * TaskParams().max_acceleration_m_s2,
                 decision_periods=settings.arguments["decision_periods"],
             )
+    return None
+
+
+def filter_around(venv: VecNormalize) -> dict[str, Any] | None:
+    """Return the specification of the safety filter around a training's batch, None without one.
+
+    Certificates are told by their names instead.
+    """
+    batch: Any = venv.venv  # an Sb3VecEnv
+    for layer in wrappers(batch.env):
+        if isinstance(layer, SafetyFilterVectorWrapper):
+            specification = layer.filtering.specification
+            if specification["name"] in STORAGE_FILTERS:
+                return specification
     return None
 
 

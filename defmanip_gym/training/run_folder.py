@@ -15,6 +15,7 @@ from typing import Any
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.files import write_atomically
 from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.sources import sources_digest
 from defmanip_gym.training.stored_run import StoredRun
 from defmanip_gym.version import __version__
 
@@ -66,6 +67,7 @@ class RunFolder:
             "command": command,
             "package_version": __version__,
             "git_revision": git_revision(),
+            "sources": sources_digest(),
         }
         write_atomically(self.path / _CONFIG, (json.dumps(content, indent=2) + "\n").encode())
 

@@ -23,6 +23,7 @@ class StoredRun:
         command: the shell command.
         package_version: of this package.
         git_revision: of the sources, or "unknown".
+        sources: digest of the files that it depends on.
     """
 
     train: TrainConfig
@@ -30,6 +31,7 @@ class StoredRun:
     command: str
     package_version: str
     git_revision: str
+    sources: str
 
     @staticmethod
     def checked(content: Any, source: str) -> StoredRun:
@@ -39,7 +41,7 @@ class StoredRun:
             ParameterError: an entry is missing, unknown, or out of range.
         """
         _require_keys("config.json", content, StoredRun)
-        for name in ("command", "package_version", "git_revision"):
+        for name in ("command", "package_version", "git_revision", "sources"):
             require_instance(name, content[name], str)
         train = content["train"]
         if isinstance(train, Mapping):
@@ -53,6 +55,7 @@ class StoredRun:
             command=content["command"],
             package_version=content["package_version"],
             git_revision=content["git_revision"],
+            sources=content["sources"],
         )
 
 

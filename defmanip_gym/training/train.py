@@ -17,16 +17,24 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from defmanip_gym.baselines.learned.agents import RUN_AGENT
 from defmanip_gym.baselines.learned.card import AgentCard, Normalization
+from defmanip_gym.baselines.residual_base import PAPERS
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.training.callbacks import Checkpoints, progress_bar, stop_on_ctrl_c
 from defmanip_gym.training.checkpoint import planned_timesteps, read_checkpoint, write_checkpoint
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.environments import make_evaluation_env, make_training_env
-from defmanip_gym.training.export import actor_modules, hidden_activation, residual_of, to_actor
+from defmanip_gym.training.export import (
+    actor_modules,
+    filter_around,
+    hidden_activation,
+    residual_of,
+    to_actor,
+)
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.learner_state import observation_statistics
 from defmanip_gym.training.model import build_model, callbacks_of
 from defmanip_gym.training.run_folder import LAST_AGENT, RunFolder
+from defmanip_gym.training.sources import sources_digest
 from defmanip_gym.training.validation_callback import ValidationCallback
 from defmanip_gym.version import __version__
 
@@ -112,6 +120,7 @@ def export(
     started = folder.read_config()  # as it was when the run began, not now
     hyperparameters = started.hyperparameters
     residual = residual_of(hyperparameters)
+    specification = filter_around(venv)
     card = AgentCard(
         env_id=config.env_id,
         observation_size=int(np.prod(venv.observation_space.shape or ())),
@@ -124,13 +133,16 @@ def export(
         normalization=Normalization(clip=venv.clip_obs, variance_floor=venv.epsilon),
         residual_authority_m_s2=residual.authority_m_s2 if residual else None,
         residual_decision_periods=residual.decision_periods if residual else 1,
+        residual_base=residual.base if residual else PAPERS,
         command=started.command,
         seed=config.seed,
         total_timesteps=model.num_timesteps,
         package_version=started.package_version,
         git_revision=started.git_revision,
+        sources=started.sources,
         certificate=residual.certificate if residual else config.certificate,
-        safety_filter=config.filter,
+        safety_filter=specification["name"] if specification else None,
+        filter_specification=specification,
     )
     to_actor(model, card, observation_statistics(venv)).save(folder.path / name)
 
@@ -146,6 +158,14 @@ def _prepare(config: TrainConfig) -> tuple[TrainConfig, dict[str, Any]]:
             stored.package_version,
             f"{__version__}, as installed",
             "Environment or reward may differ: install the run's version, or train anew.",
+        )
+    if stored.sources != sources_digest():
+        raise RunFolderError(
+            f"sources of {config.resume}",
+            stored.sources,
+            f"{sources_digest()}, as they are now",
+            f"Go on with those of revision {stored.git_revision}, or train anew: an agent of two "
+            "kinds of training would be neither's.",
         )
     total = config.total_timesteps or planned_timesteps(RunFolder(config.resume).last_checkpoint())
     return (

@@ -76,6 +76,11 @@ class Filtering:
         self.total_correction_m_s2 = 0.0
 
     @property
+    def specification(self) -> dict[str, Any]:
+        """The filter's, as JSON values."""
+        return self._filter.specification
+
+    @property
     def applies(self) -> BoolArray:
         """Whether the filter's promise covers the episodes as far as is known by now, (n,)."""
         return self._applicability.applies

@@ -9,8 +9,9 @@ from safetensors.numpy import load_file, save_file
 from small_agents import CARD, small_agent
 
 from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
-from defmanip_gym.baselines.learned.agents import controller_of, load_agent, load_family
+from defmanip_gym.baselines.learned.agents import load_agent, load_family
 from defmanip_gym.baselines.learned.card import Normalization, SuiteScore
+from defmanip_gym.baselines.learned.deployment import controller_of
 from defmanip_gym.baselines.learned.families import shipped_families, write_card
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.params import BeamParams
@@ -143,7 +144,7 @@ def test_cards_that_cannot_be_true_are_refused(changes, stem):
         ("[]", "format"),
         ("{}", "format"),
         ('{"format": 1}', "Train"),
-        ('{"format": 3}', "Upgrade"),
+        ('{"format": 4}', "Upgrade"),
         (" " * 2_000_000, "bytes"),
     ],
     ids=["empty", "deep", "binary", "list", "no format", "older", "newer", "huge"],

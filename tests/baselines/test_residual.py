@@ -7,11 +7,8 @@ import pytest
 from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import ZeroController
 from defmanip_gym.baselines.residual import ResidualController, corrected
-from defmanip_gym.baselines.residual_action import (
-    ResidualAction,
-    ResidualVectorAction,
-    residual_authority,
-)
+from defmanip_gym.baselines.residual_action import ResidualAction, ResidualVectorAction
+from defmanip_gym.baselines.residual_base import certified_authority
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams
@@ -92,7 +89,7 @@ def test_training_environment_does_what_the_controller_does_later(certificate):
     controller = ResidualController(
         TannerController(certificate=certificate, params=GENTLE_PARAMS),
         residual,
-        authority=residual_authority(certificate, TransportConfig(), 2.0),
+        authority=certified_authority(certificate, TransportConfig(), 2.0),
         decision_periods=5,
     )
     trained, _ = training.reset(seed=3)

@@ -6,11 +6,11 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from defmanip_gym.baselines.learned.agents import (
-    controller_of,
     load_agent,
     load_family,
     shipped_families,
 )
+from defmanip_gym.baselines.learned.deployment import controller_of
 from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
 from defmanip_gym.params import BeamParams

@@ -42,6 +42,7 @@ def run(tmp_path):
             "command": "python train.py",
             "package_version": "0.1.0",
             "git_revision": "0123456789ab",
+            "sources": "0123456789abcdef",
         }
         (path / "config.json").write_text(json.dumps(content, default=str))
         return path
@@ -104,9 +105,10 @@ def test_one_bad_run_and_nothing_is_shipped(run, library, bad, error, said):
 
 def test_new_agents_must_go_with_those_that_stay(run, library):
     ship(ShipConfig(runs=(run(0),), library=library))
-    other = run(1, hyperparameters={"n_envs": 3})
-    with pytest.raises(AgentFileError, match="hyperparameters"):
-        ship(ShipConfig(runs=(other,), library=library))
+    for name, value in {"hyperparameters": {"n_envs": 3}, "sources": "another"}.items():
+        other = run(1, **{name: value})
+        with pytest.raises(AgentFileError, match=name):
+            ship(ShipConfig(runs=(other,), library=library))
     assert [agent.card.seed for agent in load_family("ppo", library)] == [0]
 
 

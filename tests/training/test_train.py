@@ -10,8 +10,14 @@ import yaml
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
-from defmanip_gym.baselines.learned.agents import load_agent
+from defmanip_gym.baselines.analytic.field import FieldController
+from defmanip_gym.baselines.filtered import FilteredController
+from defmanip_gym.baselines.learned.agents import load_agent, load_controller
+from defmanip_gym.baselines.learned.deployment import training_config
 from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
+from defmanip_gym.errors import ParameterError, RunFolderError
+from defmanip_gym.evaluation.learned_contestants import agent_contestants
+from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.training import train as training
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.environments import make_training_env
@@ -158,9 +164,52 @@ def test_training_inside_a_filter_is_recorded_and_so_are_its_evaluations(config,
     folder = training.train(config(filter="storage"))
     card = load_agent(folder).card
     assert card.safety_filter == card.trained_inside == "storage" and card.certificate is None
+    assert card.filter_specification["name"] == "storage"
+    assert isinstance(load_controller(folder), FilteredController)
     assert "-ppo-storage-seed" in folder.name
     assert inside == ["SafetyFilterVectorWrapper"] * 2
     assert json.loads((folder / "config.json").read_text())["train"]["filter"] == "storage"
+
+
+def test_a_residual_of_a_registered_controller_is_deployed_above_it_and_inside_its_filter(config):
+    settings = config("residual")
+    content = yaml.safe_load(settings.hyperparameters.read_text())
+    wrapper = {"base": "field", "inside": "storage", "decision_periods": 2, "authority": 0.5}
+    content[ENV_ID] |= {
+        "env_kwargs": {"inner_loop": "measured_force"},
+        "env_wrapper": [{"defmanip_gym.baselines.residual_action.ResidualAction": wrapper}],
+    }
+    settings.hyperparameters.write_text(yaml.safe_dump(content))
+    folder = training.train(settings)
+    card = load_agent(folder).card
+    assert (card.residual_base, card.trained_inside) == ("field", "storage")
+    assert card.residual_authority_m_s2 == 1.5
+    assert training_config(card).inner_loop == "measured_force"
+    controller = load_controller(folder)
+    assert isinstance(controller, FilteredController)
+    assert isinstance(controller.controller.base, FieldController)
+    contestant, inside = agent_contestants(folder, Certificates())
+    assert {contestant.inner_loop, inside.inner_loop} == {"measured_force"}
+    assert contestant.members[0].controller.identity["base"]["controller"] == "field"
+
+
+def test_a_residual_needs_the_inner_loop_of_its_base(config):
+    settings = config("residual")
+    content = yaml.safe_load(settings.hyperparameters.read_text())
+    wrapper = {"base": "field", "inside": "storage"}
+    content[ENV_ID]["env_wrapper"] = [
+        {"defmanip_gym.baselines.residual_action.ResidualAction": wrapper}
+    ]
+    settings.hyperparameters.write_text(yaml.safe_dump(content))
+    with pytest.raises(ParameterError, match="inner_loop='measured_force'"):
+        training.train(settings)
+
+
+def test_changed_sources_are_not_gone_on_with(config, monkeypatch):
+    folder = training.train(config())
+    monkeypatch.setattr(training, "sources_digest", lambda: "another")
+    with pytest.raises(RunFolderError, match="train anew"):
+        training.train(TrainConfig(resume=folder, total_timesteps=1024))
 
 
 def test_the_filter_of_a_training_knows_what_the_environment_draws_and_how_late_actions_are(config):

@@ -34,7 +34,7 @@ from defmanip_gym.validation import (
 
 @dataclass(frozen=True, kw_only=True)
 class ShapedParams(WayLawParams):
-    """Design choices of ``shaped``.
+    """Design choices of ``shaped``; they are what a study found.
 
     Attributes:
         shaper: ``"zv"``, ``"zvd"`` or ``"zvdd"``: each takes half a period of the swing more, and
@@ -50,14 +50,14 @@ class ShapedParams(WayLawParams):
     way: WayParams = field(
         default_factory=lambda: WayParams(
             velocity_field="normalized",
-            deceleration_m_s2=5.9,
-            vertical_deceleration_m_s2=1.7,
-            approach_rate_per_s=14.5,
+            deceleration_m_s2=5.95,
+            vertical_deceleration_m_s2=0.32,
+            approach_rate_per_s=14.3,
         )
     )
-    acceleration_m_s2: float = 9.8
-    position_gain: float = 10.0
-    velocity_gain: float = 3.9
+    acceleration_m_s2: float = 10.0
+    position_gain: float = 6.1
+    velocity_gain: float = 7.8
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -35,6 +35,7 @@ def _relu(x: Array) -> Array:
 
 
 _ACTIVATIONS: dict[str, Callable[[Array], Array]] = {"tanh": np.tanh, "relu": _relu}
+_LATER_FIELDS = ("residual_base", "filter_specification", "sources")
 # Beyond what any training makes; within them no sum of the network overflows.
 _LARGEST_TENSOR_BYTES = 64 * 2**20
 _LARGEST_WEIGHT = 1e9
@@ -74,6 +75,9 @@ class MlpActor:
     def digest(self) -> str:
         """Eight hexadecimal digits that tell this agent from every other, whatever its scores."""
         card = asdict(self.card) | {"scores": {}}
+        for name in _LATER_FIELDS:  # cards from before them keep their digests
+            if card[name] == getattr(AgentCard, name):
+                del card[name]
         content = hashlib.sha256(json.dumps(card, sort_keys=True).encode())
         for array in (self._mean, self._variance, *self._weights, *self._biases):
             content.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())

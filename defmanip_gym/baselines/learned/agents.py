@@ -6,9 +6,9 @@ import os
 import zipfile
 from pathlib import Path
 
-from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.baselines.learned.actor import CARD_SUFFIX, TENSOR_SUFFIX, MlpActor, load_actor
+from defmanip_gym.baselines.learned.deployment import deployed
 from defmanip_gym.baselines.learned.families import (
     SHIPPED,
     load_family,
@@ -16,15 +16,10 @@ from defmanip_gym.baselines.learned.families import (
     shipped_families,
 )
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
-from defmanip_gym.baselines.residual import ResidualController
 from defmanip_gym.errors import AgentFileError
-from defmanip_gym.params import BeamParams
-from defmanip_gym.task_params import TaskParams
-from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 
 __all__ = [
     "RUN_AGENT",
-    "controller_of",
     "is_sb3_zip",
     "load_agent",
     "load_controller",
@@ -82,7 +77,7 @@ def load_agent(name: str | Path, library: Path = SHIPPED) -> MlpActor:
 def load_controller(
     name: str | Path, *, allow_pickle: bool = False, normalization: str | None = None
 ) -> Controller:
-    """Load an agent as the controller it stands for.
+    """Load an agent as the controller it stands for, inside the filter it learned in, if any.
 
     Args:
         name: as for :func:`load_agent`.
@@ -95,37 +90,9 @@ def load_controller(
     path = Path(name)
     if allow_pickle and is_sb3_zip(path):
         return load_sb3_zip(path, normalization)
-    return controller_of(load_agent(name))
+    return deployed(load_agent(name))
 
 
 def is_sb3_zip(path: Path) -> bool:
     """Whether a path is a zip file, which only SB3 could load."""
     return os.path.isfile(path) and zipfile.is_zipfile(path)
-
-
-def controller_of(
-    actor: MlpActor, *, certificate: Certificate | None = None
-) -> MlpActor | ResidualController:
-    """Return the controller that an agent stands for.
-
-    That is the network itself, or, of a residual agent, the paper's controller plus the network's
-    correction.
-
-    Args:
-        actor: the agent.
-        certificate: what the paper's controller under a residual keeps to; by default the one of
-            the training, computed anew for the reference beam.
-    """
-    card = actor.card
-    if card.residual_authority_m_s2 is None:
-        return actor
-    if certificate is None:
-        assert card.certificate is not None  # the card's own check
-        certificate = certify(
-            BeamParams(), method=card.certificate, conditions=TRANSPORT_CONDITIONS
-        )
-    base: Controller = TannerController(certificate=certificate, params=GENTLE_PARAMS)
-    authority = card.residual_authority_m_s2 / TaskParams().max_acceleration_m_s2
-    return ResidualController(
-        base, actor, authority=authority, decision_periods=card.residual_decision_periods
-    )

@@ -13,7 +13,8 @@ from defmanip_gym.errors import AgentFileError
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
 from defmanip_gym.theory.filters.family import STORAGE_FILTERS
 
-CARD_FORMAT = 2
+CARD_FORMAT = 3
+_READABLE = (2, CARD_FORMAT)  # 2 lacks what a later one has defaults for
 ALGORITHMS = ("ppo", "sac", "tqc", "td3")
 ACTIVATIONS = ("tanh", "relu")
 _LARGEST_CARD_BYTES = 1_000_000
@@ -90,17 +91,20 @@ class AgentCard:
         squashed: whether the output passes through tanh.
         normalization: of the observations; mean and variance are tensors.
         residual_authority_m_s2: None for a controller of its own; a number if the output, times
-            this acceleration, is added to the command of the paper's controller.
+            this acceleration, is added to the command of another.
         residual_decision_periods: control periods that such an output is held for.
+        residual_base: the registered controller that it is added to.
         algorithm: SB3's class name in lower case.
         recipe: name of the hyperparameter file.
         hyperparameters: as in that file.
         certificate: method of the certificate it was trained under, or None.
         safety_filter: name of the filter that knows the state which it was trained inside, or None.
+        filter_specification: that filter's own, so that the agent can be run inside it again.
         command: the shell command that trained it.
         seed: of the training.
         total_timesteps: environment steps it was trained for.
         git_revision: of the working tree, or "unknown".
+        sources: digest of the source files that the training depended on; None in old cards.
         scores: measured results by suite.
         format: version of this card.
 
@@ -117,21 +121,24 @@ class AgentCard:
     normalization: Normalization = field(default_factory=Normalization)
     residual_authority_m_s2: float | None = None
     residual_decision_periods: int = 1
+    residual_base: str = "tanner"
     algorithm: str
     recipe: str
     hyperparameters: Mapping[str, Any]
     certificate: str | None = None
     safety_filter: str | None = None
+    filter_specification: Mapping[str, Any] | None = None
     command: str
     seed: int
     total_timesteps: int
     git_revision: str
+    sources: str | None = None
     scores: Mapping[str, SuiteScore] = field(default_factory=dict)
     format: int = CARD_FORMAT
 
     def __post_init__(self) -> None:
         _require("env_id", self.env_id, self.env_id in ENV_IDS, f"one of {', '.join(ENV_IDS)}")
-        for name in ("package_version", "recipe", "command", "git_revision"):
+        for name in ("package_version", "recipe", "command", "git_revision", "residual_base"):
             text = getattr(self, name)
             _require(name, text, isinstance(text, str) and text != "", "a text")
         for name, low in (
@@ -152,12 +159,12 @@ class AgentCard:
             _require_choice("safety_filter", self.safety_filter, tuple(STORAGE_FILTERS))
             alone = self.certificate is None
             _require("safety_filter", self.safety_filter, alone, "null beside a certificate")
-        _require(
-            "hyperparameters",
-            self.hyperparameters,
-            _is_json_object(self.hyperparameters),
-            "an object of JSON values",
-        )
+        for name in ("hyperparameters", "filter_specification"):
+            content = getattr(self, name)
+            fits = _is_json_object(content) or (content is None and name != "hyperparameters")
+            _require(name, content, fits, "an object of JSON values")
+        is_text = isinstance(self.sources, str) and self.sources != ""
+        _require("sources", self.sources, self.sources is None or is_text, "a digest, or null")
         _require_instance("normalization", self.normalization, Normalization)
         for suite, score in self.scores.items():
             _require_instance(f"scores of {suite}", score, SuiteScore)
@@ -166,9 +173,9 @@ class AgentCard:
     def _check_residual(self) -> None:
         authority = self.residual_authority_m_s2
         fits = authority is None or (
-            self.certificate is not None and _is_number(authority, 1e-9, 1e3)
+            self.trained_inside is not None and _is_number(authority, 1e-9, 1e3)
         )
-        allowed = "null, or m/s² > 0 of an agent trained under a certificate"
+        allowed = "null, or m/s² > 0 of an agent trained inside a certificate or filter"
         _require("residual_authority_m_s2", authority, fits, allowed)
 
     @property
@@ -188,11 +195,11 @@ def read_card(path: Path) -> AgentCard:
         AgentFileError: the file is missing, damaged, or not a card of this format.
     """
     content = _parsed(read_small_file(path, "agent card (JSON)", _LARGEST_CARD_BYTES), path)
-    if not isinstance(content, dict) or content.get("format") != CARD_FORMAT:
+    if not isinstance(content, dict) or content.get("format") not in _READABLE:
         found = content.get("format") if isinstance(content, dict) else type(content).__name__
         newer = _is_whole(found, CARD_FORMAT + 1)
         remedy = "Upgrade defmanip_gym." if newer else "Train the agent again with train.py."
-        raise AgentFileError("agent card format", found, str(CARD_FORMAT), remedy)
+        raise AgentFileError("agent card format", found, " or ".join(map(str, _READABLE)), remedy)
     try:
         normalization = Normalization(**content.pop("normalization", {}))
         scores = {suite: SuiteScore(**row) for suite, row in content.pop("scores", {}).items()}

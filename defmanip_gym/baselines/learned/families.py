@@ -20,7 +20,10 @@ _ALIKE = (
     "hyperparameters",
     "certificate",
     "safety_filter",
+    "filter_specification",
     "residual_authority_m_s2",
+    "residual_base",
+    "sources",
 )
 
 
