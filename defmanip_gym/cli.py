@@ -20,6 +20,7 @@ from defmanip_gym.oracle.config import PlanConfig
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.ship_config import ShipConfig
+from defmanip_gym.training.trainings_config import TrainingsConfig
 from defmanip_gym.training.tune_config import TuneConfig
 
 Config = TypeVar("Config")
@@ -29,6 +30,7 @@ def main() -> None:
     """Entry point of ``defmanip``."""
     commands: dict[str, Callable[..., Any]] = {
         "train": TrainConfig,
+        "trainings": TrainingsConfig,
         "tune": TuneConfig,
         "compare": ComparisonConfig,
         "certify": CertifyConfig,
@@ -66,7 +68,7 @@ def _parsed(kind: type[Config], program: str) -> Config:
 def _run(config: object) -> None:
     if isinstance(config, ComparisonConfig):
         run_comparison(config)
-    elif isinstance(config, TrainConfig | TuneConfig | ShipConfig):
+    elif isinstance(config, TrainConfig | TrainingsConfig | TuneConfig | ShipConfig):
         _run_training(config)
     elif isinstance(config, CertifyConfig):
         from defmanip_gym.certification.command import run_certify  # matplotlib takes its time
@@ -87,13 +89,17 @@ def _run(config: object) -> None:
         run_plan(config)
 
 
-def _run_training(config: TrainConfig | TuneConfig | ShipConfig) -> None:
+def _run_training(config: TrainConfig | TrainingsConfig | TuneConfig | ShipConfig) -> None:
     """Run a command that imports torch and others, which take seconds and need not be there."""
     try:
         if isinstance(config, TrainConfig):
             from defmanip_gym.training.train import train
 
             print(f"Run folder: {train(config)}")
+        elif isinstance(config, TrainingsConfig):
+            from defmanip_gym.training.trainings import run_trainings
+
+            run_trainings(config)
         elif isinstance(config, TuneConfig):
             from defmanip_gym.training.tuning import run_tune
 

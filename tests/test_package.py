@@ -14,7 +14,7 @@ PACKAGE = Path(defmanip_gym.__file__).parent
 
 # lower layers first; a module imports from its own layer or below
 LAYERS = [
-    {"errors", "version", "files", "display", "compiled", "compiler", "lowering"},
+    {"errors", "version", "files", "display", "workers", "compiled", "compiler", "lowering"},
     {"validation"},
     {"params", "task_params", "observation"},
     {"theory", "plant"},

@@ -18,6 +18,7 @@ from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.contestants import standard_contestants, standard_names
 from defmanip_gym.evaluation.filter_timings import FILTER_TIMING_FILE, measured_filter_times
+from defmanip_gym.evaluation.jobs import run_job
 from defmanip_gym.evaluation.learned_contestants import agent_contestants
 from defmanip_gym.evaluation.outputs import print_results, write_outputs
 from defmanip_gym.evaluation.protection import Certificates
@@ -26,7 +27,7 @@ from defmanip_gym.evaluation.store import RecordFolder, remove_leftovers
 from defmanip_gym.evaluation.suites import suite_named
 from defmanip_gym.evaluation.timings import TIMING_FILE, measured_timings
 from defmanip_gym.evaluation.traces import TRACE_FOLDER
-from defmanip_gym.evaluation.workers import running
+from defmanip_gym.workers import running
 
 __all__ = ["ComparisonConfig", "run_comparison"]
 
@@ -135,7 +136,7 @@ def _complete_records(
     by_entry = {assignment.job.entry: assignment for assignment in work}
     jobs = [assignment.job for assignment in work if assignment.job.suite.scenarios]
     console.print(_plan(config, contestants, len(work), len(jobs)), highlight=False)
-    with progress_bar(console) as progress, running(jobs, config.jobs) as results:
+    with progress_bar(console) as progress, running(run_job, jobs, config.jobs) as results:
         bar = progress.add_task("jobs", total=max(len(jobs), 1), completed=not jobs)
         for result in results:
             by_entry[result.job.entry].keep(result, folder, traces)

@@ -57,11 +57,14 @@ def stop_on_ctrl_c() -> Iterator[Stop]:
 
 
 @contextmanager
-def progress_bar() -> Iterator[ProgressBarCallback]:
-    """Show progress, and stop showing it however training ends."""
+def progress_bar(is_shown: bool) -> Iterator[list[ProgressBarCallback]]:
+    """Show progress, if it is wanted, and stop showing it however training ends."""
+    if not is_shown:
+        yield []
+        return
     bar = ProgressBarCallback()
     try:
-        yield bar
+        yield [bar]
     finally:
         if hasattr(bar, "pbar"):  # else training has not begun
             bar.pbar.close()

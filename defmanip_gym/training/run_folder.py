@@ -37,20 +37,25 @@ class RunFolder:
         self.path = path
 
     @staticmethod
+    def named(config: TrainConfig) -> RunFolder:
+        """Return the folder that a run has by its name, whether it is there or not."""
+        inside = f"-{config.trained_inside}" if config.trained_inside else ""
+        name = f"{config.env_id}-{config.algo}{inside}-seed{config.seed}"
+        return RunFolder(config.output / name)
+
+    @staticmethod
     def create(config: TrainConfig, hyperparameters: dict[str, Any], command: str) -> RunFolder:
         """Make a folder whose name tells algorithm and seed, with its configuration inside.
 
         Raises:
             RunFolderError: the output folder cannot be written.
         """
-        inside = f"-{config.trained_inside}" if config.trained_inside else ""
-        name = f"{config.env_id}-{config.algo}{inside}-seed{config.seed}"
         try:
             config.output.mkdir(parents=True, exist_ok=True)
             temporary = Path(tempfile.mkdtemp(dir=config.output, prefix=".creating-"))
             temporary.chmod(0o755)
             RunFolder(temporary)._write_config(config, hyperparameters, command)
-            folder = RunFolder(_first_free(config.output / name))
+            folder = RunFolder(_first_free(RunFolder.named(config).path))
             os.rename(temporary, folder.path)
         except OSError as error:
             raise RunFolderError(

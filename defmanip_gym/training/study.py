@@ -37,6 +37,9 @@ _DAMAGE = (
 )
 
 
+_APART = 100_000  # seeds of processes
+
+
 def open_study(config: TuneConfig, folder: Path) -> optuna.Study:
     """Return the study of a folder, new or as it was left.
 
@@ -50,9 +53,6 @@ def open_study(config: TuneConfig, folder: Path) -> optuna.Study:
         study = optuna.create_study(
             study_name=config.algo,
             storage=_storage(path),
-            pruner=optuna.pruners.MedianPruner(
-                n_startup_trials=4, n_warmup_steps=config.timesteps // 3
-            ),
             direction="maximize",
             load_if_exists=True,
         )
@@ -73,9 +73,31 @@ def open_study(config: TuneConfig, folder: Path) -> optuna.Study:
             "one begun with the same settings and hyperparameters",
             f"Choose another --output: {_differences(stored, settings)}.",
         )
-    # a seed of its own for every start: the sampler would draw the first trials' values again
-    study.sampler = optuna.samplers.TPESampler(seed=config.seed + trials, n_startup_trials=5)
     return study
+
+
+def join_study(config: TuneConfig, folder: Path, drawn: int, process: int) -> optuna.Study:
+    """Return an open study for a process that makes trials of it.
+
+    Args:
+        config: what the study is made of.
+        folder: where it lies.
+        drawn: how many trials it had before.
+        process: which of those side by side, from 0.
+    """
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    # a seed of its own for every start: the sampler would draw the first trials' values again
+    seed = config.seed + drawn + process * _APART
+    return optuna.load_study(
+        study_name=config.algo,
+        storage=_storage(folder / STUDY_FILE),
+        sampler=optuna.samplers.TPESampler(
+            seed=seed, n_startup_trials=5, constant_liar=config.jobs > 1
+        ),
+        pruner=optuna.pruners.MedianPruner(
+            n_startup_trials=4, n_warmup_steps=config.timesteps // 3
+        ),
+    )
 
 
 def finished_trials(study: optuna.Study) -> list[FrozenTrial]:
@@ -97,7 +119,7 @@ def is_as_in_the_file(trial: optuna.Trial | FrozenTrial) -> bool:
 
 def _settings(config: TuneConfig) -> dict[str, Any]:
     """Return all that a trial's score depends on besides what is varied, as JSON keeps it."""
-    names = ("timesteps", "evaluations", "evaluation_episodes", "seed")
+    names = ("timesteps", "evaluations", "evaluation_episodes", "seed", "seeds")
     settings = {name: getattr(config, name) for name in names}
     settings |= {"package_version": __version__, "hyperparameters": _varied(config)}
     return json.loads(json.dumps(settings))

@@ -39,11 +39,15 @@ from defmanip_gym.training.validation_callback import ValidationCallback
 from defmanip_gym.version import __version__
 
 
-def train(config: TrainConfig) -> Path:
+def train(config: TrainConfig, *, shows_progress: bool = True) -> Path:
     """Train, or go on training, and return the run folder.
 
     Ctrl-C saves a checkpoint before the next rollout and exits with 130 after saying how to go on;
     a second one, and a ``KeyboardInterrupt`` from elsewhere, exit at once.
+
+    Args:
+        config: what to train.
+        shows_progress: whether a bar tells how far it is.
 
     Raises:
         ParameterError: hyperparameters that cannot be used.
@@ -83,10 +87,10 @@ def train(config: TrainConfig) -> Path:
         export(folder, LAST_AGENT, config, model, venv)
 
     try:
-        with stop_on_ctrl_c() as stop, progress_bar() as bar:
+        with stop_on_ctrl_c() as stop, progress_bar(shows_progress) as bars:
             model.learn(
                 total - model.num_timesteps,
-                callback=CallbackList([*callbacks, Checkpoints(save, interval, stop), bar]),
+                callback=CallbackList([*callbacks, Checkpoints(save, interval, stop), *bars]),
                 reset_num_timesteps=False,
             )
             save()

@@ -8,7 +8,9 @@ from typing import Literal, cast, get_args
 
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
 from defmanip_gym.training.config import Recipe, TrainConfig
-from defmanip_gym.validation import require_choice, require_whole, settle
+from defmanip_gym.validation import MOST_WORKERS, require_choice, require_whole, settle
+
+_MOST_SEEDS = 100
 
 AnalyticName = Literal["tanner", "oriented", "field", "lqr", "shaped", "mpc"]
 
@@ -17,10 +19,11 @@ AnalyticName = Literal["tanner", "oriented", "field", "lqr", "shaped", "mpc"]
 class TuneConfig:
     """Search for better hyperparameters with Optuna; a second run goes on with the study.
 
-    A trial trains for --timesteps steps and is scored on starts that neither training nor any suite
-    uses: the mean over episodes of the share of time left when the goal was reached, 0 if it was
-    not. An analytic controller is scored on the same starts in the same way and gets as many steps
-    of the environment, --trials times --timesteps; since it need not train, that makes more trials.
+    A trial trains with --seeds seeds for --timesteps steps each and is scored on starts that
+    neither training nor any suite uses: the mean over episodes of the share of time left when the
+    goal was reached, 0 if it was not. An analytic controller is scored on the same starts in the
+    same way and gets as many steps of the environment, --trials times --seeds times --timesteps;
+    since it need not train, that makes more trials.
 
     Examples:
         defmanip tune --algo ppo --trials 20
@@ -41,7 +44,7 @@ class TuneConfig:
     controller, trainings whose steps it may take."""
 
     timesteps: int = 500_000
-    """Environment steps of a trial."""
+    """Environment steps of each training."""
 
     evaluations: int = 4
     """Evaluations in a trial; after each, trials worse than the median are given up."""
@@ -50,7 +53,15 @@ class TuneConfig:
     """Episodes per evaluation."""
 
     seed: int = 0
-    """Of the search and of every trial's training."""
+    """Of the search, and the first one of every trial's trainings."""
+
+    seeds: int = 3
+    """Trainings of a trial, with one seed after the other; its score is their mean, and it is
+    given up by the mean so far."""
+
+    jobs: int = 1
+    """Processes that take trials from the same study; a joblib backend of yours decides itself.
+    What is drawn depends on which trial ends first, if there are several."""
 
     output: Path = Path("runs/tuning")
     """Folder in which study folders are made."""
@@ -63,16 +74,18 @@ class TuneConfig:
         require_choice("env", self.env, ENV_IDS)
         settle(self, "trials", require_whole, 1)
         settle(self, "timesteps", require_whole, 1)
+        settle(self, "seeds", require_whole, 1, _MOST_SEEDS)
+        settle(self, "jobs", require_whole, 1, MOST_WORKERS)
         for name in ("evaluations", "evaluation_episodes", "seed", "num_threads"):
-            object.__setattr__(self, name, getattr(self.training, name))  # which checks the rest
+            # which checks the rest
+            object.__setattr__(self, name, getattr(self.training(0), name))
 
-    @property
-    def training(self) -> TrainConfig:
-        """How a trial trains."""
+    def training(self, number: int) -> TrainConfig:
+        """Return how a trial's training of that number trains, counted from 0."""
         return TrainConfig(
             algo="ppo" if self.is_analytic else cast(Recipe, self.algo),
             env=self.env,
-            seed=self.seed,
+            seed=self.seed + number,
             total_timesteps=self.timesteps,
             evaluations=self.evaluations,
             evaluation_episodes=self.evaluation_episodes,
@@ -87,7 +100,7 @@ class TuneConfig:
     @property
     def step_budget(self) -> int:
         """Steps of the environment that all trials may take together."""
-        return self.trials * self.timesteps
+        return self.trials * self.seeds * self.timesteps
 
     @property
     def command(self) -> str:
@@ -95,6 +108,6 @@ class TuneConfig:
         words = ["defmanip tune"]
         for field in fields(self):
             value = getattr(self, field.name)
-            if value != field.default and field.name != "num_threads":
+            if value != field.default and field.name not in ("num_threads", "jobs"):
                 words.append(f"--{field.name.replace('_', '-')} {value}")
         return " ".join(words)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import optuna
@@ -23,10 +25,12 @@ from defmanip_gym.training.study import (
     begin_with_the_file,
     finished_trials,
     is_as_in_the_file,
+    join_study,
     open_study,
 )
 from defmanip_gym.training.tune_config import TuneConfig
 from defmanip_gym.training.validation_callback import ValidationCallback
+from defmanip_gym.workers import running
 
 TABLE_FILE = "trials.md"
 _SHOWN = 5  # the best trials of an analytic controller
@@ -52,7 +56,7 @@ def run_tune(config: TuneConfig) -> Path:
         with FileLock(folder / ".lock", timeout=0):
             study = open_study(config, folder)
             table = folder / TABLE_FILE
-            _run_missing(config, study, console)
+            _run_missing(config, study, folder)
             write_atomically(table, study_table(study, config).encode())
     except Timeout as error:
         raise RunFolderError(
@@ -69,27 +73,50 @@ def run_tune(config: TuneConfig) -> Path:
     return table
 
 
-class _Watch(BaseCallback):
-    """Reports a trial's scores and gives it up if it is hopeless."""
+@dataclass(frozen=True, kw_only=True)
+class _Share:
+    """The trials that one process makes.
 
-    def __init__(self, trial: optuna.Trial, validation: ValidationCallback) -> None:
-        super().__init__()
-        self.trial, self.validation, self.pruned = trial, validation, False
+    Attributes:
+        config: of the study.
+        folder: where it lies; other machines must see it, too.
+        count: how many trials.
+        drawn: how many the study had before.
+        number: of the share, from 0.
+    """
 
-    def _on_step(self) -> bool:
-        if self.validation.n_calls % self.validation.eval_freq == 0:
-            self.trial.report(self.validation.score, self.num_timesteps)
-            self.pruned = self.trial.should_prune()
-        return not self.pruned
+    config: TuneConfig
+    folder: Path
+    count: int
+    drawn: int
+    number: int
 
 
-def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> None:
+def _run_missing(config: TuneConfig, study: optuna.Study, folder: Path) -> None:
+    """Make the missing trials, in several processes if that is wanted."""
     missing = config.trials - len(finished_trials(study))
     if config.is_analytic:
         missing = int(_steps_left(config, study) > 0) and _MOST_TRIALS
     if missing <= 0:
         return
+    drawn = len(study.trials)
     begin_with_the_file(study)
+    counts = [len(range(number, missing, config.jobs)) for number in range(config.jobs)]
+    shares = [
+        _Share(config=config, folder=folder, count=count, drawn=drawn, number=number)
+        for number, count in enumerate(counts)
+        if count
+    ]
+    with running(_take, shares, config.jobs) as results:
+        for _ in results:
+            pass
+
+
+def _take(share: _Share) -> None:
+    """Make a share of a study's trials."""
+    torch.set_num_threads(1)
+    config, console = share.config, Console()
+    study = join_study(config, share.folder, share.drawn, share.number)
 
     def tell(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:
         value = "given up" if trial.value is None else f"{trial.value:.3f}"
@@ -99,7 +126,7 @@ def _run_missing(config: TuneConfig, study: optuna.Study, console: Console) -> N
 
     study.optimize(
         lambda trial: _objective(config, trial),
-        n_trials=missing,
+        n_trials=share.count,
         callbacks=[tell],
     )
 
@@ -112,12 +139,26 @@ def _steps_left(config: TuneConfig, study: optuna.Study) -> int:
 def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
     if config.is_analytic:
         return analytic_objective(config, trial)
-    training = config.training
     hyperparameters = load_hyperparameters(None, config.algo, config.env)
     if not is_as_in_the_file(trial):
         hyperparameters |= SEARCH_SPACES[config.algo](trial)
+    scores: list[float] = []
+    while len(scores) < config.seeds:
+        scores.append(_training_score(config, trial, hyperparameters, scores))
+    return fmean(scores)
+
+
+def _training_score(
+    config: TuneConfig, trial: optuna.Trial, hyperparameters: dict[str, Any], earlier: list[float]
+) -> float:
+    """Return the score of a trial's next training, after ``earlier`` ones.
+
+    Raises:
+        TrialPruned: the mean so far is below the median of other trials.
+    """
+    training = config.training(len(earlier))
     venv = make_training_env(training, hyperparameters)
-    model = build_model(config.algo, config.seed, hyperparameters, venv)
+    model = build_model(config.algo, training.seed, hyperparameters, venv)
     interval = max(1, config.timesteps // config.evaluations // venv.num_envs)
     validation = ValidationCallback(
         make_evaluation_env(training, hyperparameters),
@@ -125,7 +166,7 @@ def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
         interval=interval,
         on_best=lambda: None,
     )
-    watch = _Watch(trial, validation)
+    watch = _Watch(trial, validation, earlier, len(earlier) * config.timesteps)
     try:
         model.learn(config.timesteps, callback=[*callbacks_of(hyperparameters), validation, watch])
     finally:
@@ -133,6 +174,35 @@ def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
     if watch.pruned:
         raise optuna.TrialPruned()
     return validation.score
+
+
+class _Watch(BaseCallback):
+    """Reports a trial's scores and gives it up if it is hopeless.
+
+    Args:
+        trial: whose training this is.
+        validation: tells the scores.
+        earlier: scores of the trial's trainings before.
+        steps: that those took.
+    """
+
+    def __init__(
+        self,
+        trial: optuna.Trial,
+        validation: ValidationCallback,
+        earlier: list[float],
+        steps: int,
+    ) -> None:
+        super().__init__()
+        self.trial, self.validation, self.pruned = trial, validation, False
+        self._earlier, self._steps = earlier, steps
+
+    def _on_step(self) -> bool:
+        if self.validation.n_calls % self.validation.eval_freq == 0:
+            mean = fmean((*self._earlier, self.validation.score))
+            self.trial.report(mean, self._steps + self.num_timesteps)
+            self.pruned = self.trial.should_prune()
+        return not self.pruned
 
 
 def study_table(study: optuna.Study, config: TuneConfig) -> str:

@@ -134,6 +134,32 @@ def test_a_damaged_study_is_refused_and_left_as_it_is(damage, quick, tmp_path):
     assert path.read_bytes() == damaged
 
 
+def test_several_processes_take_trials_of_the_same_study(tmp_path):
+    settings = config(
+        tmp_path, algo="tanner", trials=2, timesteps=1000, seeds=1, evaluation_episodes=2, jobs=2
+    )
+    table = tuning.run_tune(settings).read_text()
+    assert "as in the file" in table and "--jobs" not in table
+    study = studies.open_study(settings, tmp_path / f"{settings.env}-tanner")
+    assert len(study.trials) == len({tuple(trial.params.values()) for trial in study.trials}) >= 2
+    assert sum(trial.user_attrs["steps"] for trial in study.trials) >= 2000
+
+
+def test_the_score_of_a_trial_is_the_mean_over_its_seeds(monkeypatch, tmp_path):
+    seeds = []
+
+    def score(config, trial, hyperparameters, earlier):
+        seeds.append(config.training(len(earlier)).seed)
+        return float(len(earlier))
+
+    monkeypatch.setattr(tuning, "_training_score", score)
+    tuning.run_tune(config(tmp_path, trials=1, seed=5, seeds=3))
+    (trial,) = studies.open_study(
+        config(tmp_path, trials=1, seed=5, seeds=3), next(tmp_path.iterdir())
+    ).trials
+    assert seeds == [5, 6, 7] and trial.value == 1.0
+
+
 def test_a_short_trial_trains_and_is_scored(tmp_path):
     table = tuning.run_tune(
         config(tmp_path, trials=1, timesteps=4096, evaluations=1, evaluation_episodes=2)
@@ -147,7 +173,7 @@ def test_every_recipe_has_a_search_space_that_its_algorithm_takes(algo, tmp_path
     trial = optuna.create_study().ask()
     hyperparameters = load_hyperparameters(None, algo, settings.env) | SEARCH_SPACES[algo](trial)
     yaml.safe_dump(hyperparameters)  # what was found can be written into a file
-    venv = make_training_env(settings.training, hyperparameters)
+    venv = make_training_env(settings.training(0), hyperparameters)
     build_model(algo, 0, hyperparameters, venv)
     venv.close()
 

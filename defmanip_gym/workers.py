@@ -5,24 +5,28 @@ from __future__ import annotations
 import signal
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import joblib
 from joblib._parallel_backends import LokyBackend
 from joblib.parallel import get_active_backend
 
-from defmanip_gym.evaluation.jobs import Job, JobResult, run_job
-
 _PATIENCE_S = 5.0
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 
 @contextmanager
-def running(jobs: Sequence[Job], processes: int | None) -> Iterator[Iterator[JobResult]]:
+def running(
+    function: Callable[[Job], Result], jobs: Sequence[Job], processes: int | None
+) -> Iterator[Iterator[Result]]:
     """Run jobs and give their results as they are done; whatever ends the block ends the workers.
 
     Args:
+        function: runs a job; of a module, so that other processes find it.
         jobs: in the order in which they are started.
         processes: as many as cores by default; 1 runs them in this process. A backend chosen by
             ``joblib.parallel_config`` decides itself.
@@ -37,7 +41,7 @@ def running(jobs: Sequence[Job], processes: int | None) -> Iterator[Iterator[Job
         n_jobs=processes or -1, return_as="generator_unordered", batch_size=1, **arguments
     )
     with _sigint_ignored():
-        results = parallel(joblib.delayed(run_job)(job) for job in jobs)
+        results = parallel(joblib.delayed(function)(job) for job in jobs)
     try:
         yield results
     except BaseException:
