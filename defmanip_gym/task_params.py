@@ -16,6 +16,7 @@ from defmanip_gym.validation import (
     require_non_negative,
     require_number,
     require_params,
+    require_range,
     settle,
 )
 
@@ -47,17 +48,22 @@ class RewardParams:
 class StartParams:
     """Where episodes start: uniformly within ``spread`` of ``center``, at rest.
 
-    Both are (x, y, θ, q1, q2, φ); the center is the start of the paper's simulation.
+    Both are (x, y, θ, q1, q2, φ); the center is the start of the paper's simulation. With
+    ``distance_m`` the base starts that far from the goal's, between the two numbers, at any bearing
+    and with any heading instead; its area is not covered evenly, its distances are.
     """
 
     center: tuple[float, ...] = (-8.5, 5.5, 0.0, math.pi / 3, -math.pi / 2, 0.0)
     spread: tuple[float, ...] = (1.5, 1.5, 0.5, 0.1, 0.1, 0.05)
+    distance_m: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         settle(self, "center", require_finite_sequence, 6)
         settle(self, "spread", require_finite_sequence, 6)
         if min(self.spread) < 0:
             raise ParameterError("spread", self.spread, "6 numbers >= 0", "Give half-widths.")
+        if self.distance_m is not None:
+            settle(self, "distance_m", require_range, 0.0, 1e4, "m")
 
     @property
     def largest_swing_rad(self) -> float:

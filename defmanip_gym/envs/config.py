@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from defmanip_gym.disturbance_ranges import DisturbanceRanges
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import (
     BeamParams,
@@ -48,6 +49,7 @@ class TransportConfig:
     nominal_beam: BeamParams | None = None
     task: TaskParams = field(default_factory=TaskParams)
     disturbance: DisturbanceParams = field(default_factory=DisturbanceParams)
+    disturbance_ranges: DisturbanceRanges = field(default_factory=DisturbanceRanges)
 
     def __post_init__(self) -> None:
         for name, kind, optional in (
@@ -58,6 +60,7 @@ class TransportConfig:
             ("nominal_beam", BeamParams, True),
             ("task", TaskParams, False),
             ("disturbance", DisturbanceParams, False),
+            ("disturbance_ranges", DisturbanceRanges, False),
         ):
             if not (optional and getattr(self, name) is None):
                 settle(self, name, require_params, kind)
@@ -81,6 +84,11 @@ class TransportConfig:
                 f"{self.beam.segment_count}, the true beam's",
                 "The controller observes one angle per true segment.",
             )
+
+    @property
+    def largest_disturbance(self) -> DisturbanceParams:
+        """The disturbance, with the largest values that an episode may draw."""
+        return self.disturbance_ranges.largest(self.disturbance)
 
     @property
     def believed_robot(self) -> RobotParams:

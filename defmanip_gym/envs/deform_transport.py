@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from defmanip_gym.disturbance_ranges import DisturbanceRanges
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, InnerLoopKind, TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.episode_access import EpisodeAccess, frames_per_second
@@ -42,8 +43,8 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     point, Eq. (29), over `task.max_acceleration_m_s2` (3 m/s²). A built-in feedback linearization
     with nominal parameters, Eq. (28), turns it into forces; a limiter keeps the grasp below
     `task.max_speed_m_s` (2 m/s, to within 3 % as the beam swings) and never hinders braking.
-    `inner_loop="measured_force"` has no model of the beam: it takes the grasp force as it was last
-    observed, sensor noise included, Eqs. (2), (3). It changes only what is between w and forces.
+    `inner_loop="measured_force"` has no model of the beam, but the grasp force as last observed,
+    sensor noise included, Eqs. (2), (3). It changes only what is between w and forces.
 
     | Num | Action                          | Min | Max | Unit    |
     | --- | ------------------------------- | --- | --- | ------- |
@@ -105,9 +106,10 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
 
     ## Starting State
     At rest, uniformly within ±(1.5 m, 1.5 m, 0.5 rad, 0.1 rad, 0.1 rad, 0.05 rad) of the paper's
-    (x, y, θ, q1, q2, φ) = (-8.5, 5.5, 0, π/3, -π/2, 0). `reset(options={"start": "paper"})` starts
-    right there, and `{"start": (x, y, θ, q1, q2, φ)}` anywhere in the workspace. With
-    `beam_ranges`, as in `BeamRanges(damping=(0.05, 1.0))`, each episode draws its own beam.
+    (x, y, θ, q1, q2, φ) = (-8.5, 5.5, 0, π/3, -π/2, 0), or, by `task.start.distance_m`, on a ring.
+    `reset(options={"start": "paper"})` starts right there, and `{"start": (x, y, θ, q1, q2, φ)}`
+    anywhere in the workspace. With `beam_ranges`, as in `BeamRanges(damping=(0.05, 1.0))`, each
+    episode draws its own beam, by `disturbance_ranges` its own disturbance.
 
     ## Episode End
     Termination: success (grasp within 5 cm of the goal, slower than 5 cm/s, |φ| < 0.05 rad, heading
@@ -135,6 +137,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | nominal_beam    | `None`           | its beam; `beam` with no damping at the root           |
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
     | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
+    | disturbance_ranges | none (`DisturbanceRanges()`) | of these, to draw each episode from |
 
     Parameters may also be mappings of their fields, as the JSON of `env.spec` holds them.
 
@@ -164,6 +167,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         nominal_beam: BeamParams | None = None,
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
+        disturbance_ranges: DisturbanceRanges = DisturbanceRanges(),
     ) -> None:
         if render_mode is not None:
             require_choice("render_mode", render_mode, RENDER_MODES)
@@ -175,8 +179,8 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
             default_camera_config=default_camera_config,
         )
         self.render_mode = render_mode
-        self.width, self.height = view.width, view.height
-        self.camera_id, self.camera_name = view.camera_id, view.camera_name
+        self.width, self.height, self.camera_id = view.width, view.height, view.camera_id
+        self.camera_name = view.camera_name
         self.config = TransportConfig(
             control_mode=control_mode,
             inner_loop=inner_loop,
@@ -189,6 +193,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
             nominal_beam=nominal_beam,
             task=task,
             disturbance=disturbance,
+            disturbance_ranges=disturbance_ranges,
         )
         self.metadata = {**type(self).metadata, "render_fps": frames_per_second(self.config)}
         self.engine = TransportEngine(self.config, num_envs=1)
@@ -235,8 +240,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     # Gymnasium's property np_random reads and sets these
     @property
     def _np_random(self) -> np.random.Generator:
-        generator: np.random.Generator = self.engine.generators[0]
-        return generator
+        return self.engine.generators[0]
 
     @_np_random.setter
     def _np_random(self, generator: np.random.Generator) -> None:

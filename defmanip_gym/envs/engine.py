@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import machine_code, without_garbage_collection
 from defmanip_gym.envs.carried_beams import VARIED, CarriedBeams
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.envs.disturbance import disturbing_force
+from defmanip_gym.envs.disturbance import EpisodeDisturbances
 from defmanip_gym.envs.generators import EpisodeGenerators
 from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score
@@ -55,7 +55,7 @@ class TransportEngine:
         num_threads: int = 0,
         max_episode_steps: int | None = None,
     ) -> None:
-        check_starts(extreme_starts(config.task.start), config)
+        check_starts(extreme_starts(config.task.start, config.task.goal), config)
         self.config, self.num_envs = config, num_envs
         self.layout = ObservationLayout(config.beam.segment_count)
         self._task, self._goal = task_of(config), goal_of(config)
@@ -71,8 +71,9 @@ class TransportEngine:
         self._inner_loop = InnerLoop(config, self.simulation.generalized_forces)
         self.action_size = self._inner_loop.action_size
         self.generators = EpisodeGenerators(num_envs)
-        self._starts = StartSampler(config.task.start, self.generators)
-        self._noise = SensorNoise(config.disturbance, self.layout, self.generators)
+        self._starts = StartSampler(config.task.start, self.generators, config.task.goal)
+        self._disturbances = EpisodeDisturbances(config, self.generators)
+        self._noise = SensorNoise(self._disturbances, self.layout, self.generators)
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
@@ -170,6 +171,7 @@ class TransportEngine:
             self._forget(self.generators.seed(ids.tolist(), seeds))
         starts = self._starts.sample(ids) if requested is None else requested[ids]
         self._beams.draw(ids)
+        self._disturbances.draw(ids)
         self._place(ids, starts)
         self._steps[ids] = 0
         self._is_started = True
@@ -200,6 +202,7 @@ class TransportEngine:
             "starts": self._starts.get_state(),
             "noise": self._noise.get_state(),
             "beams": self._beams.get_state(),
+            "disturbances": self._disturbances.get_state(),
             "simulation": self.simulation.get_state(),
             "plant": self._plant.copy()._asdict(),
             "inner_loop": self._inner_loop.get_state(self._plant),
@@ -214,15 +217,17 @@ class TransportEngine:
         Raises:
             StateError: it does not fit; then nothing has changed.
         """
-        checked_by_themselves = dict.fromkeys(("beams", "noise", "starts"))
+        checked_by_themselves = dict.fromkeys(("beams", "disturbances", "noise", "starts"))
         own = self.get_state() | checked_by_themselves
         state = fitted("state", state, own)
         if not isinstance(state["is_started"], bool):
             raise StateError("state['is_started']", state["is_started"], "a bool", "See get_state.")
         starts = self._starts.fitting(state["starts"])
         beams, noise = self._beams.fitting(state["beams"]), self._noise.fitting(state["noise"])
+        disturbances = self._disturbances.fitting(state["disturbances"])
         self.generators.set_state(state["generators"])
         self._beams.set_state(beams)
+        self._disturbances.set_state(disturbances)
         self._starts.set_state(starts)
         self._noise.set_state(noise)
         self.simulation.set_state(state["simulation"])
@@ -256,8 +261,8 @@ class TransportEngine:
         forces = self.simulation.generalized_forces
         actions = self._inner_loop.write_forces(actions, self._plant, forces, idle=idle)
         before = self._scores
-        if self.config.disturbance.has_force:
-            self.simulation.push_grasp(disturbing_force(self.config, self._steps))
+        if self._disturbances.has_force:
+            self.simulation.push_grasp(self._disturbances.force(self._steps))
         failed = self.simulation.step(self.config.task.substeps)
         self._steps += 1
         self._plant, self._plant_before = self._plant_before, self._plant

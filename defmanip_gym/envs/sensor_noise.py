@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.envs.disturbance import EpisodeDisturbances
 from defmanip_gym.envs.state_tree import fitted, require_drawn
 from defmanip_gym.errors import StateError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import DisturbanceParams
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
@@ -24,22 +24,23 @@ class SensorNoise:
     """Adds noise to the observations of n episodes.
 
     Args:
-        disturbance: its standard deviations.
+        disturbances: of the episodes, with their standard deviations.
         layout: of the observations.
         generators: one for each episode; read anew at every draw.
     """
 
     def __init__(
         self,
-        disturbance: DisturbanceParams,
+        disturbances: EpisodeDisturbances,
         layout: ObservationLayout,
         generators: Sequence[np.random.Generator],
     ) -> None:
-        deviations = np.zeros(layout.size)
-        layout.part(deviations, "grasp_force_b")[:] = disturbance.force_sensor_noise_n
-        layout.part(deviations, "swing")[:] = disturbance.swing_sensor_noise_rad
-        self._columns = np.flatnonzero(deviations)
-        self._deviations = deviations[self._columns]
+        largest, noisy, feeling = disturbances.largest, np.zeros(layout.size), np.zeros(layout.size)
+        layout.part(feeling, "grasp_force_b")[:] = largest.force_sensor_noise_n
+        layout.part(noisy, "swing")[:] = largest.swing_sensor_noise_rad
+        self._columns = np.flatnonzero(feeling + noisy)
+        self._feels = feeling[self._columns] > 0
+        self._disturbances = disturbances
         self._generators = generators
         count = len(generators)
         self._drawn = np.zeros((count, _STEPS_PER_DRAW, len(self._columns)))
@@ -83,6 +84,7 @@ class SensorNoise:
             drawn = self._drawn[index]
             drawn[:] = self._generators[index].standard_normal(drawn.shape)
             self._used[index] = 0
-        noise = self._drawn[ids, self._used[ids]] * self._deviations
+        deviations = np.where(self._feels, *self._disturbances.deviations(ids))
+        noise = self._drawn[ids, self._used[ids]] * deviations
         observations[ids[:, None], self._columns] += noise
         self._used[ids] += 1

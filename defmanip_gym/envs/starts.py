@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
@@ -13,7 +14,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.state_tree import fitted, require_drawn
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
-from defmanip_gym.task_params import StartParams
+from defmanip_gym.task_params import StartParams, TaskParams
 from defmanip_gym.validation import number_array
 
 Array = NDArray[np.float64]
@@ -58,14 +59,21 @@ def requested_starts(options: Mapping[str, Any] | None, count: int) -> Array | N
 
 
 class StartSampler:
-    """Draws starts, uniform within the spread, for n episodes.
+    """Draws starts, uniform within the spread or the ring, for n episodes.
 
     Args:
-        params: center and spread.
+        params: center and spread, or distances.
         generators: one for each episode, looked up anew at every draw.
+        goal: (x, y, θ, ...) that distances are from.
     """
 
-    def __init__(self, params: StartParams, generators: Sequence[np.random.Generator]) -> None:
+    def __init__(
+        self,
+        params: StartParams,
+        generators: Sequence[np.random.Generator],
+        goal: Sequence[float] = TaskParams().goal,
+    ) -> None:
+        self._ring, self._goal = params.distance_m, goal
         self._lowest = np.array(params.center) - np.array(params.spread)
         self._width = 2.0 * np.array(params.spread)
         self._generators = generators
@@ -101,13 +109,30 @@ class StartSampler:
             self._used[spent] = 0
         starts = self._drawn[ids, self._used[ids]]
         self._used[ids] += 1
-        return self._lowest + self._width * starts
+        placed: Array = self._lowest + self._width * starts
+        if self._ring is not None:
+            placed[:, :3] = _on_ring(self._ring, self._goal, starts[:, :3])
+        return placed
 
 
-def extreme_starts(params: StartParams) -> Array:
-    """Return the corners of the sampled region, (64, 6)."""
+def extreme_starts(params: StartParams, goal: Sequence[float]) -> Array:
+    """Return the corners of the sampled region, (64, 6); of a ring, some of its points."""
     signs = np.array(list(product((-1.0, 1.0), repeat=6)))
-    return np.array(params.center) + signs * np.array(params.spread)
+    corners: Array = np.array(params.center) + signs * np.array(params.spread)
+    if params.distance_m is not None:
+        corners[:, :3] = _on_ring(params.distance_m, goal, 0.5 + 0.5 * signs[:, :3])
+    return corners
+
+
+def _on_ring(distance_m: tuple[float, float], goal: Sequence[float], shares: Array) -> Array:
+    """Return (x, y, θ) of starts, (k, 3), from shares in [0, 1] of distance, bearing, heading."""
+    nearest, farthest = distance_m
+    distance = nearest + (farthest - nearest) * shares[:, 0]
+    bearing, turn = (math.tau * shares[:, axis] - math.pi for axis in (1, 2))
+    x, y, heading = goal[:3]
+    return np.column_stack(
+        (x + distance * np.cos(bearing), y + distance * np.sin(bearing), heading + turn)
+    )
 
 
 def check_starts(starts: Array, config: TransportConfig) -> None:

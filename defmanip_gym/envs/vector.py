@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from defmanip_gym.disturbance_ranges import DisturbanceRanges
 from defmanip_gym.envs.config import ConstraintMode, ControlMode, InnerLoopKind, TransportConfig
 from defmanip_gym.envs.deform_transport import action_space, observation_space
 from defmanip_gym.envs.engine import TransportEngine
@@ -73,6 +74,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         nominal_beam: see there.
         task: see there.
         disturbance: see there.
+        disturbance_ranges: see there; every episode of the batch draws its own.
     """
 
     metadata: dict[str, Any] = {
@@ -105,6 +107,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         nominal_beam: BeamParams | None = None,
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
+        disturbance_ranges: DisturbanceRanges = DisturbanceRanges(),
     ) -> None:
         num_envs = require_whole("num_envs", num_envs, 1, MOST_ENVS)
         max_episode_steps = require_whole("max_episode_steps", max_episode_steps, 1)
@@ -137,6 +140,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
             nominal_beam=nominal_beam,
             task=task,
             disturbance=disturbance,
+            disturbance_ranges=disturbance_ranges,
         )
         self.metadata = {
             **type(self).metadata,

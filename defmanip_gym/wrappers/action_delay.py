@@ -11,6 +11,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.validation import require_whole
 from defmanip_gym.wrappers.actions import finite_actions
 
@@ -28,20 +29,23 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
 
     Args:
         env: a batched environment.
-        periods: control periods that an action takes; zero changes nothing.
+        periods: control periods that an action takes; zero changes nothing. Or the fewest and the
+            most, between which each episode draws its own from its generator (after its start).
 
     Raises:
-        ParameterError: periods that are not a whole number.
+        ParameterError: periods that are not a whole number, or two.
     """
 
-    remembers = ("_under_way", "_ended", "_is_started")
+    remembers = ("_under_way", "_delays", "_ended", "_is_started")
 
-    def __init__(self, env: gymnasium.vector.VectorEnv[Any, Any, Any], periods: int) -> None:
-        periods = require_whole("periods", periods, 0, _MOST_PERIODS)
+    def __init__(
+        self, env: gymnasium.vector.VectorEnv[Any, Any, Any], periods: int | tuple[int, int]
+    ) -> None:
+        self._fewest, self.periods = _required(periods)
         super().__init__(env)
-        self.periods = periods
         shape = env.action_space.shape or (env.num_envs,)
-        self._under_way = np.zeros((periods, *shape))  # the first is the next to take effect
+        self._under_way = np.zeros((self.periods, *shape))  # the last was sent a period ago
+        self._delays = np.full(env.num_envs, self.periods)
         self._ended = np.zeros(env.num_envs, dtype=bool)
         self._is_started = False
 
@@ -49,6 +53,16 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
     def keeps_actions(self) -> bool:
         """Whether every action arrives as it was sent."""
         return self.periods == 0
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether episodes differ by their delay."""
+        return self._fewest < self.periods
+
+    @property
+    def delays(self) -> NDArray[np.int64]:
+        """Control periods that an action takes in each episode, (n,)."""
+        return self._delays.copy()
 
     def reset(
         self,
@@ -66,7 +80,7 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
         return observation, info
 
     def step(self, actions: Array) -> tuple[Array, Array, BoolArray, BoolArray, dict[str, Any]]:
-        """Step with the actions that were sent ``periods`` steps ago.
+        """Step with the actions that were sent ``delays`` steps ago.
 
         Raises:
             ActionError: actions that are not finite or of another shape.
@@ -80,7 +94,8 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
         sent = finite_actions(actions, ~idle, self._under_way.shape[2:])
         under_way = np.concatenate((self._under_way, sent[None]))
         self._under_way = under_way[1:]
-        observation, reward, terminated, truncated, info = self.env.step(under_way[0])
+        arriving = under_way[self.periods - self._delays, np.arange(self.num_envs)]
+        observation, reward, terminated, truncated, info = self.env.step(arriving)
         ended = terminated | truncated
         if is_next_step:
             self._begin(self._ended)
@@ -91,3 +106,17 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
 
     def _begin(self, started: BoolArray) -> None:
         self._under_way[:, started] = 0.0
+        if self.is_drawn:
+            generators: Any = self.env.unwrapped
+            for index in np.flatnonzero(started):
+                generator: np.random.Generator = generators.np_random[index]
+                self._delays[index] = generator.integers(self._fewest, self.periods + 1)
+
+
+def _required(periods: object) -> tuple[int, int]:
+    """Return the fewest and the most periods."""
+    ends = periods if isinstance(periods, Sequence | np.ndarray) else (periods, periods)
+    if isinstance(ends, str) or len(ends) != 2:
+        raise ParameterError("periods", periods, "a whole number, or two", "Give (fewest, most).")
+    fewest = require_whole("periods", ends[0], 0, _MOST_PERIODS)
+    return fewest, require_whole("periods", ends[1], fewest, _MOST_PERIODS)

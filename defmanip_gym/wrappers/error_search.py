@@ -10,18 +10,20 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defmanip_gym.disturbance_ranges import DisturbanceRanges
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.envs.disturbance import disturbing_force
+from defmanip_gym.envs.disturbance import EpisodeDisturbances
 from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import GRAVITY_M_S2
+from defmanip_gym.params import GRAVITY_M_S2, BeamParams, BeamRanges
 from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
@@ -71,6 +73,18 @@ def require_affordable(config: TransportConfig) -> None:
         )
 
 
+def at_its_worst(config: TransportConfig, beam: BeamParams) -> TransportConfig:
+    """Return an environment that carries one of its beams and is disturbed the most."""
+    return replace(
+        config,
+        beam=beam,
+        nominal_beam=config.believed_beam,
+        beam_ranges=BeamRanges(),
+        disturbance=config.largest_disturbance,
+        disturbance_ranges=DisturbanceRanges(),
+    )
+
+
 class ErrorSearch:
     """Some of the robots start from rest, the others are on their way.
 
@@ -108,6 +122,7 @@ class ErrorSearch:
         )
         self._inner_loop = InnerLoop(config, self._simulation.generalized_forces)
         self._filter, self._memory = safety_filter, safety_filter.memory(count)
+        self._disturbances = EpisodeDisturbances(config, [rng] * count)
         self._moving = np.arange(count) >= len(resting.joints)
         self._place(resting, ~self._moving)
         self._place(moving, self._moving)
@@ -149,8 +164,8 @@ class ErrorSearch:
         self._inner_loop.write_forces(
             command / task.max_acceleration_m_s2, plant, simulation.generalized_forces
         )
-        if self._config.disturbance.has_force:
-            simulation.push_grasp(disturbing_force(self._config, self._steps))
+        if self._disturbances.has_force:
+            simulation.push_grasp(self._disturbances.force(self._steps))
         at_a_time = -(-task.substeps // _READINGS)
         start = Sensed.observed(self._layout, before)
         times, velocities = [0.0], [start.velocity_b]

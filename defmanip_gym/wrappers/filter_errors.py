@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import BeamRanges
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
-from defmanip_gym.wrappers.error_search import ErrorSearch, require_affordable
+from defmanip_gym.wrappers.error_search import ErrorSearch, at_its_worst, require_affordable
 from defmanip_gym.wrappers.filter_motions import moving_states, resting_states
 
 Array = NDArray[np.float64]
@@ -53,9 +52,7 @@ def filter_errors(config: TransportConfig, safety_filter: StorageFilter) -> Filt
     require_affordable(config)
     errors = np.zeros(_FOUND)
     for beam in dict.fromkeys(config.beam_ranges.extremes(config.beam)):
-        carried = replace(
-            config, beam=beam, nominal_beam=config.believed_beam, beam_ranges=BeamRanges()
-        )
+        carried = at_its_worst(config, beam)
         errors = np.maximum(errors, _errors(carried, safety_filter))
     found = (_MARGIN * errors).tolist()
     return FilterErrors(

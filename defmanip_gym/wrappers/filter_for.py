@@ -48,7 +48,8 @@ def filter_for(
         names = ", ".join(each.__name__ for each in _KINDS)
         raise ParameterError("kind", kind, f"one of {names}", "Other filters are made directly.")
     conditions = FilterConditions(
-        swing_noise_rad=config.disturbance.swing_sensor_noise_rad, delay_periods=delay_periods
+        swing_noise_rad=config.largest_disturbance.swing_sensor_noise_rad,
+        delay_periods=delay_periods,
     )
     made = kind(
         beam,

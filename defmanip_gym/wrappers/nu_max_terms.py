@@ -108,7 +108,7 @@ class NuMaxTerms:
 
     @property
     def _start_noise_rad(self) -> float:
-        return NOISE_BOUND * self._config.disturbance.swing_sensor_noise_rad
+        return NOISE_BOUND * self._config.largest_disturbance.swing_sensor_noise_rad
 
     @property
     def _allowed_errors(self) -> str:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.params import BeamRanges
 from defmanip_gym.theory.certificates.certificate import Certificate
 from defmanip_gym.theory.certificates.error_budget import ErrorBudget
 from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
 from defmanip_gym.wrappers.admissible_motions import moving_motions, resting_motions
-from defmanip_gym.wrappers.error_search import ErrorSearch, require_affordable
+from defmanip_gym.wrappers.error_search import ErrorSearch, at_its_worst, require_affordable
 
 Array = NDArray[np.float64]
 
@@ -52,9 +51,7 @@ def realization_errors(config: TransportConfig, certificate: Certificate) -> Rea
     require_affordable(config)
     each = []
     for beam in dict.fromkeys(config.beam_ranges.extremes(config.beam)):
-        carried = replace(
-            config, beam=beam, nominal_beam=config.believed_beam, beam_ranges=BeamRanges()
-        )
+        carried = at_its_worst(config, beam)
         each.append(_errors(carried, certificate))
     return RealizationErrors(
         room_m_s2=max(errors.room_m_s2 for errors in each),

@@ -82,7 +82,7 @@ class StorageTerms(WatchedTerms):
             CertificateError: the search for errors would take too long.
         """
         config, conditions = self._config, self._filter.conditions
-        noise = config.disturbance.swing_sensor_noise_rad
+        noise = config.largest_disturbance.swing_sensor_noise_rad
         if noise > conditions.swing_noise_rad:
             return (
                 f"swing angles are measured with noise of {noise:.3g} rad; the filter provides for "

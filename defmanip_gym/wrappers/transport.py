@@ -61,17 +61,18 @@ def action_changers(env: Any) -> tuple[str, ...]:
     """Return the names of the wrappers of ``env`` that may change an action on its way.
 
     Those are all but Gymnasium's that do not, wrappers without a ``step`` of their own, those that
-    say so by an attribute ``keeps_actions`` that is true, and ``ActionDelay``, which filters know.
+    say so by an attribute ``keeps_actions`` that is true, and ``ActionDelay`` with one delay for
+    all episodes, which filters know.
     """
     return tuple(
         type(layer).__name__
         for layer in wrappers(env)
-        if not (_keeps_actions(layer) or isinstance(layer, ActionDelay))
+        if not (_keeps_actions(layer) or (isinstance(layer, ActionDelay) and not layer.is_drawn))
     )
 
 
 def delay_periods(env: Any) -> int:
-    """Return by how many control periods the wrappers of ``env`` hold actions back."""
+    """Return by how many control periods, at most, wrappers of ``env`` hold actions back."""
     return sum(layer.periods for layer in wrappers(env) if isinstance(layer, ActionDelay))
 
 

@@ -9,7 +9,9 @@ from defmanip_gym.errors import ActionError, ParameterError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.wrappers.action_delay import ActionDelay
+from defmanip_gym.wrappers.filter_for import filter_for
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
+from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"
 
@@ -108,3 +110,28 @@ def test_bad_actions_are_refused_at_once():
 def test_impossible_delays_are_refused(periods):
     with pytest.raises(ParameterError, match="periods"):
         delayed(periods)
+
+
+def test_episodes_may_each_be_late_by_their_own():
+    env, arriving = delayed((0, 3), "SameStep", count=8, max_episode_steps=6)
+    env.reset(seed=0)
+    delays = env.delays
+    assert env.is_drawn and set(delays) <= {0, 1, 2, 3} and len(set(delays)) > 1
+    send(env, *(0.1 * step for step in range(1, 6)))
+    expected = 0.1 * np.maximum(np.arange(1, 6)[:, None] - delays, 0)
+    np.testing.assert_allclose(np.array(arriving.actions), expected)
+    send(env, 0.0)  # all are cut, and draw anew
+    assert (env.delays != delays).any()
+
+
+def test_drawn_delays_are_the_seeds_and_filters_do_not_cover_them():
+    many, few = delayed((1, 3), count=4)[0], delayed((1, 3), count=2)[0]
+    many.reset(seed=[1, 2, 3, 4])
+    few.reset(seed=[3, 4])
+    np.testing.assert_array_equal(many.delays[2:], few.delays)
+    env = ActionDelay(gymnasium.make_vec(ENV_ID, num_envs=2), (1, 3))
+    filtered = SafetyFilterVectorWrapper(env, filter_for(env.unwrapped.config))
+    _, info = filtered.reset(seed=0)
+    assert not info["filter_applies"].any() and "ActionDelay" in info["filter_reason"][0]
+    with pytest.raises(ParameterError, match="periods"):
+        ActionDelay(few, (3, 1))
