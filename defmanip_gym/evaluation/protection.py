@@ -26,7 +26,9 @@ MEASURED_FACTORS = MISMATCH_FACTORS | {"mass_kg": (0.5, 2.0)}
 
 
 class Protection(Protocol):
-    """What keeps a contestant within σ; can be pickled."""
+    """What keeps a contestant within σ; can be pickled and hashed."""
+
+    def __hash__(self) -> int: ...
 
     @property
     def method(self) -> str:
