@@ -14,8 +14,10 @@ from rich.markup import escape
 
 from defmanip_gym.catalogue.config import AgentsConfig
 from defmanip_gym.certification.config import CertifyConfig
+from defmanip_gym.datasets.config import DatasetConfig
 from defmanip_gym.errors import DefmanipError, InstallationError
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
+from defmanip_gym.exports.config import ExportConfig
 from defmanip_gym.oracle.config import PlanConfig
 from defmanip_gym.reproduction.config import ReproductionConfig
 from defmanip_gym.training.config import TrainConfig
@@ -37,6 +39,8 @@ def main() -> None:
         "reproduce": ReproductionConfig,
         "agents": AgentsConfig,
         "plan": PlanConfig,
+        "dataset": DatasetConfig,
+        "export": ExportConfig,
         "ship": ShipConfig,
     }
     _guarded(
@@ -68,7 +72,7 @@ def _parsed(kind: type[Config], program: str) -> Config:
 def _run(config: object) -> None:
     if isinstance(config, ComparisonConfig):
         run_comparison(config)
-    elif isinstance(config, TrainConfig | TrainingsConfig | TuneConfig | ShipConfig):
+    elif isinstance(config, TrainConfig | TrainingsConfig | TuneConfig | ShipConfig | ExportConfig):
         _run_training(config)
     elif isinstance(config, CertifyConfig):
         from defmanip_gym.certification.command import run_certify  # matplotlib takes its time
@@ -82,14 +86,19 @@ def _run(config: object) -> None:
         from defmanip_gym.catalogue.command import run_agents
 
         run_agents(config)
+    elif isinstance(config, DatasetConfig):
+        from defmanip_gym.datasets.command import run_dataset
 
+        run_dataset(config)
     elif isinstance(config, PlanConfig):
         from defmanip_gym.oracle.command import run_plan
 
         run_plan(config)
 
 
-def _run_training(config: TrainConfig | TrainingsConfig | TuneConfig | ShipConfig) -> None:
+def _run_training(
+    config: TrainConfig | TrainingsConfig | TuneConfig | ShipConfig | ExportConfig,
+) -> None:
     """Run a command that imports torch and others, which take seconds and need not be there."""
     try:
         if isinstance(config, TrainConfig):
@@ -104,6 +113,10 @@ def _run_training(config: TrainConfig | TrainingsConfig | TuneConfig | ShipConfi
             from defmanip_gym.training.tuning import run_tune
 
             run_tune(config)
+        elif isinstance(config, ExportConfig):
+            from defmanip_gym.exports.command import run_export
+
+            run_export(config)
         else:
             from defmanip_gym.training.shipping import run_ship
 

@@ -110,6 +110,10 @@ class RecordError(InvalidValueError):
     """Evaluation records that cannot be read or do not belong to this comparison."""
 
 
+class DatasetError(InvalidValueError):
+    """A dataset of episodes that cannot be written, read or simulated again."""
+
+
 class InstallationError(InvalidValueError):
     """A package that is not installed, of those that only some commands need."""
 

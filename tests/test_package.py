@@ -24,8 +24,9 @@ LAYERS = [
     {"wrappers"},
     {"baselines"},
     {"evaluation"},
-    {"reproduction", "certification", "catalogue", "oracle"},
+    {"reproduction", "certification", "catalogue", "oracle", "datasets"},
     {"training"},
+    {"exports"},
     {"cli", "__main__"},
 ]
 # siblings that must not know each other

@@ -33,6 +33,7 @@ def test_the_agent_inside_the_filter_arrives_and_is_hardly_ever_corrected(capsys
         "README.md",
         "CONTRIBUTING.md",
         "docs/architecture.md",
+        "docs/data.md",
         "docs/evaluation.md",
         "docs/filters.md",
         "docs/training.md",

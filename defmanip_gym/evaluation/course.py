@@ -21,6 +21,7 @@ class Course:
     Attributes:
         observation: what the controller saw, (K + 1, size).
         margin_rad: σ − ‖z2‖∞, (K + 1,).
+        cost: 1 where σ is exceeded, else 0, (K + 1,).
         distance_m: grasp to goal, (K + 1,).
         base_pose: (x, y, θ), world frame, (K + 1, 3).
         swing_rad: φ of each segment without the sensors' noise, (K + 1, N).
@@ -35,10 +36,12 @@ class Course:
         reached_goal: whether the last moment is a success.
         left_workspace: whether it is outside of the workspace.
         simulation_failed: whether the simulation diverged.
+        terminated: whether it ended by what happened in it; if not, its time was over.
     """
 
     observation: Array
     margin_rad: Array
+    cost: Array
     distance_m: Array
     base_pose: Array
     swing_rad: Array
@@ -53,6 +56,7 @@ class Course:
     reached_goal: bool
     left_workspace: bool
     simulation_failed: bool
+    terminated: bool
 
 
 class CourseRecorder:
@@ -80,6 +84,7 @@ class CourseRecorder:
         self._moments = {
             "observation": np.empty((*moments, size)),
             "margin_rad": np.empty(moments),
+            "cost": np.empty(moments),
             "distance_m": np.empty(moments),
             "base_pose": np.empty((*moments, 3)),
             "swing_rad": np.empty((*moments, segments)),
@@ -95,6 +100,7 @@ class CourseRecorder:
         if self._applies is not None:
             self._periods |= {name: np.empty(periods) for name in _INTERVENTIONS}
         self._ends = {name: np.zeros(count, dtype=bool) for name in _END_FLAGS}
+        self._terminated = np.zeros(count, dtype=bool)
         self._lengths = np.zeros(count, dtype=np.int64)
         self._keep_moment(observation, info)
 
@@ -105,6 +111,7 @@ class CourseRecorder:
         applied: Array,
         observation: Array,
         reward: Array,
+        terminated: BoolArray,
         info: dict[str, Any],
     ) -> None:
         """Keep one control period and the moment at its end.
@@ -115,6 +122,7 @@ class CourseRecorder:
             applied: those that took effect, (n, 3).
             observation: at its end, (n, size).
             reward: (n,).
+            terminated: (n,).
             info: at its end.
         """
         values = {"requested": requested, "applied": applied, "reward": reward, **info}
@@ -126,6 +134,7 @@ class CourseRecorder:
             kept[:, self._steps] = values[_INTERVENTIONS.get(name, name)]
         self._steps += 1
         self._lengths[running] = self._steps
+        self._terminated[running] = terminated[running]
         if self._applies is not None:
             self._applies[running] = info["filter_applies"][running]
         for name, key in _END_FLAGS.items():
@@ -141,12 +150,14 @@ class CourseRecorder:
         values: dict[str, Any] = dict.fromkeys(_INTERVENTIONS)
         values |= moments | periods | ends
         applies = None if self._applies is None else bool(self._applies[index])
-        return Course(**values, certificate_applies=applies)
+        terminated = bool(self._terminated[index])
+        return Course(**values, certificate_applies=applies, terminated=terminated)
 
     def _keep_moment(self, observation: Array, info: dict[str, Any]) -> None:
         plant, k = self._engine.plant_state, self._steps
         self._moments["observation"][:, k] = observation
         self._moments["margin_rad"][:, k] = info["constraint_margin"]
+        self._moments["cost"][:, k] = info["cost"]
         self._moments["distance_m"][:, k] = info["distance_to_goal"]
         self._moments["base_pose"][:, k] = plant.base_pose
         self._moments["swing_rad"][:, k] = plant.swing

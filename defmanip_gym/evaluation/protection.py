@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol
 
-from defmanip_gym.envs.config import InnerLoopKind
+from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.params import DESIGN_DAMPING, BeamRanges
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
@@ -26,7 +26,9 @@ MEASURED_FACTORS = MISMATCH_FACTORS | {"mass_kg": (0.5, 2.0)}
 
 
 class Protection(Protocol):
-    """What keeps a contestant within σ; can be pickled."""
+    """What keeps a contestant within σ; can be pickled and hashed."""
+
+    def __hash__(self) -> int: ...
 
     @property
     def method(self) -> str:
@@ -45,6 +47,10 @@ class Protection(Protocol):
 
     def filter_for(self, condition: Condition) -> SafetyFilter:
         """Return the filter for the environments of a condition."""
+        ...
+
+    def filter_in(self, config: TransportConfig) -> SafetyFilter:
+        """Return the filter for an environment, and all beams that it draws."""
         ...
 
 
@@ -66,7 +72,11 @@ class CertificateProtection:
 
     def filter_for(self, condition: Condition) -> SafetyFilter:
         """Return the filter for the environments of a condition."""
-        return nu_max_filter(condition.environment, self.certificate)
+        return self.filter_in(condition.environment)
+
+    def filter_in(self, config: TransportConfig) -> SafetyFilter:
+        """Return the filter for an environment."""
+        return nu_max_filter(config, self.certificate)
 
 
 @dataclass(frozen=True)
@@ -101,6 +111,15 @@ class StorageProtection:
         """Return the filter for the environments of a condition."""
         return _storage_filter(self, condition)
 
+    def filter_in(self, config: TransportConfig, delay_periods: int = 0) -> SafetyFilter:
+        """Return the filter for an environment, and all beams that it draws."""
+        return filter_for(
+            config,
+            kind=(STORAGE_FILTERS | REFERENCE_FILTERS)[self.method],
+            beam=NOMINAL_BEAM,
+            delay_periods=delay_periods,
+        )
+
 
 @lru_cache(maxsize=64)
 def _storage_filter(protection: StorageProtection, condition: Condition) -> SafetyFilter:
@@ -112,12 +131,7 @@ def _storage_filter(protection: StorageProtection, condition: Condition) -> Safe
             for name, ends in protection.factors.items()
         }
         config = replace(config, beam=NOMINAL_BEAM, beam_ranges=BeamRanges(**ranges))
-    return filter_for(
-        config,
-        kind=(STORAGE_FILTERS | REFERENCE_FILTERS)[protection.method],
-        beam=NOMINAL_BEAM,
-        delay_periods=condition.delay_periods,
-    )
+    return protection.filter_in(config, condition.delay_periods)
 
 
 class Certificates:

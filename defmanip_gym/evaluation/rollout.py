@@ -16,7 +16,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.errors import ActionError
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
-from defmanip_gym.evaluation.course import CourseRecorder
+from defmanip_gym.evaluation.course import Course, CourseRecorder
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.measures import episode_record
 from defmanip_gym.evaluation.records import EpisodeRecord
@@ -69,9 +69,6 @@ def rollout(
 ) -> tuple[Episode, ...]:
     """Run a controller from every scenario's start; an episode's record depends on nothing else.
 
-    Episodes that have ended stay in the batch with action zero and their last observation, and
-    nothing of them counts any more.
-
     Args:
         entry: who this is, for the records.
         controller: row i of its batches is scenario i throughout.
@@ -88,8 +85,53 @@ def rollout(
         The episodes in the order of the scenarios.
     """
     horizon_s = require_positive("horizon_s", horizon_s, "s")
-    steps = max(1, round(horizon_s / config.task.control_period_s))
-    transport = _environment(config, len(scenarios), steps, num_threads)
+    happened = courses(
+        controller,
+        [scenario.seed for scenario in scenarios],
+        starts=np.array([scenario.start for scenario in scenarios]),
+        config=config,
+        steps=max(1, round(horizon_s / config.task.control_period_s)),
+        safety_filter=safety_filter,
+        delay_periods=delay_periods,
+        num_threads=num_threads,
+    )
+    episodes = []
+    for scenario, course in zip(scenarios, happened, strict=True):
+        record = episode_record(course, entry, scenario, config, nominal_beam=nominal_beam)
+        wanted = scenario.name in traced
+        trace = trace_of(course, entry, scenario.name, config) if wanted else None
+        episodes.append(Episode(record=record, trace=trace))
+    return tuple(episodes)
+
+
+def courses(
+    controller: Controller,
+    seeds: Sequence[int],
+    *,
+    config: TransportConfig,
+    steps: int,
+    starts: Array | None = None,
+    safety_filter: SafetyFilter | None = None,
+    delay_periods: int = 0,
+    num_threads: int = 0,
+) -> tuple[Course, ...]:
+    """Run a controller in a batch of episodes and return what happened in each.
+
+    Episodes that have ended stay in the batch with action zero and their last observation, and
+    nothing of them counts any more.
+
+    Args:
+        controller: row i of its batches is episode i throughout.
+        seeds: of the episodes, at least one.
+        config: the environment.
+        steps: control periods after which an episode times out.
+        starts: (n, 6), m and rad; drawn from the seeds by default.
+        safety_filter: around the environment; None runs without one.
+        delay_periods: control periods by which actions, filtered ones too, take effect later.
+        num_threads: physics threads, 0 for one per CPU.
+    """
+    count = len(seeds)
+    transport = _environment(config, count, steps, num_threads)
     applied = AppliedActions(transport)
     env: gymnasium.vector.VectorEnv[Array, Array, Array] = applied
     if delay_periods:
@@ -97,33 +139,27 @@ def rollout(
     if safety_filter is not None:
         env = SafetyFilterVectorWrapper(env, safety_filter)
     observation, info = env.reset(
-        seed=[scenario.seed for scenario in scenarios],  # type: ignore[arg-type]
-        options={"start": np.array([scenario.start for scenario in scenarios])},
+        seed=list(seeds),  # type: ignore[arg-type]
+        options=None if starts is None else {"start": starts},
     )
-    courses = CourseRecorder(transport.engine, observation, info, steps)
-    running = np.ones(len(scenarios), dtype=bool)
+    recorder = CourseRecorder(transport.engine, observation, info, steps)
+    running = np.ones(count, dtype=bool)
     episode_start, state = running.copy(), None
     try:
         while running.any():
             actions, state = controller.predict(
                 observation, state, episode_start, deterministic=True
             )
-            actions = np.where(running[:, None], _checked(actions, len(scenarios)), 0.0)
+            actions = np.where(running[:, None], _checked(actions, count), 0.0)
             episode_start = np.zeros_like(running)
             after, reward, terminated, truncated, info = env.step(actions)
             observation = np.where(running[:, None], after, observation)
-            courses.add(running, actions, applied.actions, observation, reward, info)
+            ended: BoolArray = np.asarray(terminated, dtype=bool)
+            recorder.add(running, actions, applied.actions, observation, reward, ended, info)
             running = running & ~np.logical_or(terminated, truncated)
     finally:
         env.close()
-    episodes = []
-    for index, scenario in enumerate(scenarios):
-        course = courses.course(index)
-        record = episode_record(course, entry, scenario, config, nominal_beam=nominal_beam)
-        wanted = scenario.name in traced
-        trace = trace_of(course, entry, scenario.name, config) if wanted else None
-        episodes.append(Episode(record=record, trace=trace))
-    return tuple(episodes)
+    return tuple(recorder.course(index) for index in range(count))
 
 
 def _checked(actions: object, count: int) -> Array:

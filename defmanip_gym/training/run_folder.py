@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
@@ -17,7 +16,7 @@ from defmanip_gym.files import write_atomically
 from defmanip_gym.training.config import TrainConfig
 from defmanip_gym.training.sources import sources_digest
 from defmanip_gym.training.stored_run import StoredRun
-from defmanip_gym.version import __version__
+from defmanip_gym.version import __version__, git_revision
 
 LAST_AGENT = "last"  # beside RUN_AGENT, the best on the validation starts
 
@@ -123,22 +122,6 @@ class RunFolder:
 
     def _checkpoints(self) -> list[Path]:
         return sorted((self.path / _CHECKPOINTS).glob("step-*"))
-
-
-def git_revision() -> str:
-    """Return the revision of the working tree that holds this package, or "unknown"."""
-    try:
-        answer = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
-    return answer.stdout.strip()
 
 
 def _first_free(path: Path) -> Path:

@@ -88,6 +88,21 @@ class MlpActor:
         """Length of the observations it takes."""
         return self.card.observation_size
 
+    @property
+    def observation_mean(self) -> Array:
+        """What is subtracted from observations, (size,)."""
+        return self._mean
+
+    @property
+    def observation_variance(self) -> Array:
+        """Whose root, with the card's floor under it, they are divided by, (size,)."""
+        return self._variance
+
+    @property
+    def layers(self) -> tuple[tuple[Array, Array], ...]:
+        """Weight (out, in) and bias (out,) of each layer."""
+        return tuple(zip(self._weights, self._biases, strict=True))
+
     def predict(
         self,
         observation: Array,

@@ -1,0 +1,1 @@
+"""``defmanip dataset``: episodes of any contestant as a Minari dataset, and their check."""

@@ -1,0 +1,1 @@
+"""``defmanip export``: agents as ONNX graphs, and as zip files of Stable-Baselines3."""
