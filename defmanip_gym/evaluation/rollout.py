@@ -11,10 +11,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from defmanip_gym.baselines.controller import Controller
+from defmanip_gym.baselines.controller import Controller, State
+from defmanip_gym.baselines.factories import is_own, what_was_raised
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
-from defmanip_gym.errors import ActionError
+from defmanip_gym.errors import ActionError, ControllerError, DefmanipError
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
 from defmanip_gym.evaluation.course import CourseRecorder
 from defmanip_gym.evaluation.entry import Entry
@@ -86,6 +87,10 @@ def rollout(
 
     Returns:
         The episodes in the order of the scenarios.
+
+    Raises:
+        ControllerError: what somebody else's ``predict`` raised.
+        ActionError: a controller's action has another shape or is not finite.
     """
     horizon_s = require_positive("horizon_s", horizon_s, "s")
     steps = max(1, round(horizon_s / config.task.control_period_s))
@@ -105,10 +110,8 @@ def rollout(
     episode_start, state = running.copy(), None
     try:
         while running.any():
-            actions, state = controller.predict(
-                observation, state, episode_start, deterministic=True
-            )
-            actions = np.where(running[:, None], _checked(actions, len(scenarios)), 0.0)
+            decided, state = _decision(entry, controller, observation, state, episode_start)
+            actions = np.where(running[:, None], _checked(decided, len(scenarios)), 0.0)
             episode_start = np.zeros_like(running)
             after, reward, terminated, truncated, info = env.step(actions)
             observation = np.where(running[:, None], after, observation)
@@ -124,6 +127,28 @@ def rollout(
         trace = trace_of(course, entry, scenario.name, config) if wanted else None
         episodes.append(Episode(record=record, trace=trace))
     return tuple(episodes)
+
+
+def _decision(
+    entry: Entry,
+    controller: Controller,
+    observation: Array,
+    state: State | None,
+    episode_start: BoolArray,
+) -> tuple[object, State | None]:
+    """Return a controller's actions and state; what others' code raises as an error of ours."""
+    try:
+        actions, state = controller.predict(observation, state, episode_start, deterministic=True)
+    except Exception as error:
+        if isinstance(error, DefmanipError) or is_own(type(controller).__module__):
+            raise
+        raise ControllerError(
+            "predict of the controller",
+            entry.contestant,
+            "predict(observation, state, episode_start, deterministic) → (actions, state)",
+            what_was_raised(error),
+        ) from error
+    return actions, state
 
 
 def _checked(actions: object, count: int) -> Array:
