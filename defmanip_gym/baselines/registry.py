@@ -17,7 +17,7 @@ from defmanip_gym.baselines.controller import Controller
 from defmanip_gym.baselines.factories import is_own, make_controller, what_was_raised
 from defmanip_gym.baselines.registrations import registrations
 from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
-from defmanip_gym.errors import ControllerError, DefmanipError
+from defmanip_gym.errors import ControllerError, InvalidValueError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,11 +39,11 @@ class Survey:
 
     Attributes:
         available: ``module:factory`` by name, of those that can be made here.
-        left_out: why others are not, by name.
+        left_out: why others are not.
     """
 
     available: Mapping[str, str]
-    left_out: Mapping[str, DefmanipError]
+    left_out: tuple[InvalidValueError, ...]
 
 
 def registered_controllers() -> dict[str, str]:
@@ -57,14 +57,14 @@ def registered_controllers() -> dict[str, str]:
 def surveyed_controllers() -> Survey:
     """Return which of the registered controllers can be made with what is installed."""
     found, available = registrations(), {}
-    left_out: dict[str, DefmanipError] = dict(found.refused)
+    left_out: list[InvalidValueError] = [*found.refused.values()]
     for name, reference in found.usable.items():
         try:
             told_by(reference, TransportConfig())
             available[name] = reference
-        except DefmanipError as error:
-            left_out[name] = error
-    return Survey(available=available, left_out=dict(sorted(left_out.items())))
+        except InvalidValueError as error:
+            left_out.append(named(name, error))
+    return Survey(available=available, left_out=tuple(left_out))
 
 
 def available_controllers() -> dict[str, str]:
@@ -85,6 +85,15 @@ def told_by(reference: str, config: TransportConfig) -> Told:
     if knows is not None and not isinstance(knows, str):
         raise ControllerError(f"knows of {reference}", knows, "a text", "Describe it in words.")
     return Told(inner_loop=inner_loop_of(reference, controller), knows=knows)
+
+
+def named(name: str, error: InvalidValueError) -> InvalidValueError:
+    """Return an error about a registered controller's reference with its name and cause."""
+    told = type(error)(
+        f"controller {name!r}: {error.name}", error.value, error.allowed, error.remedy
+    )
+    told.__cause__ = error.__cause__ or error
+    return told
 
 
 def identity_of(reference: str, controller: Controller) -> dict[str, Any]:

@@ -99,8 +99,8 @@ def _contestants(config: ComparisonConfig, console: Console) -> tuple[Contestant
 def _everybody(console: Console) -> tuple[str, ...]:
     """Return the standard comparison's names, and say who cannot take part and why."""
     survey = surveyed_controllers()
-    for name, error in survey.left_out.items():
-        console.print(f"Left out: {name}. {error}", soft_wrap=True, highlight=False, markup=False)
+    for error in survey.left_out:
+        console.print(f"Left out: {error}", soft_wrap=True, highlight=False, markup=False)
     return standard_names_with(survey.available)
 
 

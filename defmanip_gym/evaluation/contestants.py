@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from defmanip_gym.baselines.factories import is_reference
 from defmanip_gym.baselines.learned.agents import load_family, shipped_families
 from defmanip_gym.baselines.registrations import REFERENCES, registrations
-from defmanip_gym.baselines.registry import available_controllers, registered_controllers
-from defmanip_gym.errors import ControllerError
+from defmanip_gym.baselines.registry import available_controllers, named, registered_controllers
+from defmanip_gym.errors import ControllerError, InstallationError
 from defmanip_gym.evaluation.analytic_contestants import controller_contestant
 from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Random, Zero
@@ -123,10 +123,9 @@ def _contestant(
     if base in registered:
         try:
             return controller_contestant(base, registered[base], method, certificates)
-        except ControllerError as error:  # which knows the entry point's value only
-            raise ControllerError(
-                f"contestant {base}: {error.name}", error.value, error.allowed, error.remedy
-            ) from (error.__cause__ or error)
+        except (ControllerError, InstallationError) as error:
+            told = named(base, error)
+            raise told from told.__cause__
     return family_contestant(name, certificates, member_limit)
 
 

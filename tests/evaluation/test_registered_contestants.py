@@ -76,7 +76,7 @@ def test_the_standard_comparison_goes_on_without_them_and_says_so_once(
         ("nowhere", "There is no 'nowhere'"),
         ("a/b", "letters"),
     ):
-        (line,) = (each for each in said if each.startswith(f"Left out: {name}."))
+        (line,) = (each for each in said if each.startswith(f"Left out: controller {name!r}"))
         assert why in line
 
 
@@ -93,7 +93,9 @@ def test_a_name_that_a_package_may_not_give_is_refused_where_it_is_asked_for(
 def test_one_that_cannot_be_made_is_an_error_where_it_is_asked_for(
     strangers, tmp_path, name, cause
 ):
-    with pytest.raises(ControllerError, match=f"contestant {name}: .*{STRANGERS[name]}") as caught:
+    with pytest.raises(
+        ControllerError, match=f"controller '{name}': .*{STRANGERS[name]}"
+    ) as caught:
         run(tmp_path, (name,))
     assert type(caught.value.__cause__) is cause
 
