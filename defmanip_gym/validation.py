@@ -214,13 +214,21 @@ def plain(value: Any) -> Any:
 def settle(instance: object, name: str, require: Callable[..., object], *arguments: Any) -> None:
     """Give a field of a frozen dataclass, while it is made, the plain value that a check returns.
 
+    A mapping in the place of parameters changes what it names, and the rest is as in the field's
+    own default, which need not be that of the parameters' class.
+
     Args:
         instance: the dataclass.
         name: of the field.
         require: a check from this module; called with name, value, and ``arguments``.
         arguments: of the check.
     """
-    object.__setattr__(instance, name, require(name, getattr(instance, name), *arguments))
+    value = getattr(instance, name)
+    if isinstance(value, Mapping):
+        (own,) = (each for each in fields(instance) if each.name == name)  # type: ignore[arg-type]
+        default = own.default if own.default_factory is MISSING else own.default_factory()
+        value = _completed(value, default)
+    object.__setattr__(instance, name, require(name, value, *arguments))
 
 
 def number_array(values: object) -> NDArray[np.float64] | None:
@@ -234,6 +242,20 @@ def number_array(values: object) -> NDArray[np.float64] | None:
         return np.array(array, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError, RuntimeError):  # the last one is PyTorch's
         return None
+
+
+def _completed(given: Mapping[Any, Any], default: object) -> Mapping[Any, Any]:
+    """Return a mapping with the other fields of a dataclass in it; as it is if it fits none."""
+    if not is_dataclass(default) or isinstance(default, type):
+        return given
+    own = {field.name: getattr(default, field.name) for field in fields(default)}
+    if not set(given) <= set(own):
+        return given  # whose check tells of the names as they were written
+    changed = {
+        name: _completed(value, own[name]) if isinstance(value, Mapping) else value
+        for name, value in given.items()
+    }
+    return own | changed
 
 
 def _unwrapped(value: Any) -> Any:

@@ -16,7 +16,7 @@ PACKAGE = Path(defmanip_gym.__file__).parent
 LAYERS = [
     {"errors", "version", "files", "display", "workers", "compiled", "compiler", "lowering"},
     {"validation"},
-    {"params", "task_params", "observation"},
+    {"params", "task_params", "observation", "disturbance_ranges"},
     {"theory", "plant"},
     {"objects", "planning"},
     {"attack"},

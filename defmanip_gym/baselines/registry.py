@@ -1,133 +1,99 @@
-"""Controllers by name: entry points of installed packages, and ``module:factory`` for any other.
+"""Registered controllers by name, and what controllers tell of themselves.
 
-A factory takes the definition of the environment as controllers may know it, and returns a
-controller. The package's own are registered as anybody's are, in its ``pyproject.toml``.
+The package's own are registered as anybody's are, as entry points in its ``pyproject.toml``.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib
 import json
-import sys
-from importlib.metadata import distributions
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol, cast, get_args
+from typing import Any, cast, get_args
 
 from defmanip_gym.baselines.controller import Controller
+from defmanip_gym.baselines.factories import is_own, make_controller, what_was_raised
+from defmanip_gym.baselines.registrations import registrations
 from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
-from defmanip_gym.errors import ControllerError, InstallationError
-from defmanip_gym.theory.certificates import Certificate
-
-CONTROLLER_GROUP = "defmanip_gym.controllers"  # of entry points
-
-_OWN = "defmanip_gym"
-_EXAMPLE = "my_package.my_module:make_controller"
+from defmanip_gym.errors import ControllerError, InvalidValueError
 
 
-class Factory(Protocol):
-    """Makes a controller for an environment."""
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """What a controller tells of itself.
 
-    def __call__(self, config: TransportConfig) -> Controller:
-        """Return the controller.
+    Attributes:
+        inner_loop: that it is made for.
+        knows: beyond the observation; None if it says nothing.
+    """
 
-        Args:
-            config: the nominal environment: task, σ, and robot and beam as everybody believes them.
-        """
-        ...
+    inner_loop: InnerLoopKind
+    knows: str | None
 
 
-class BoundedFactory(Protocol):
-    """One that can also keep to a certificate's bounds by itself."""
+@dataclass(frozen=True, kw_only=True)
+class Survey:
+    """Registered controllers, in alphabetical order.
 
-    def __call__(
-        self, config: TransportConfig, certificate: Certificate | None = None
-    ) -> Controller:
-        """Return the controller, within the certificate's bounds if given one."""
-        ...
+    Attributes:
+        available: ``module:factory`` by name, of those that can be made here.
+        left_out: why others are not.
+    """
+
+    available: Mapping[str, str]
+    left_out: tuple[InvalidValueError, ...]
 
 
 def registered_controllers() -> dict[str, str]:
     """Return ``module:factory`` by name, of all installed packages, in alphabetical order.
 
-    Raises:
-        ControllerError: two packages give one name to different factories.
+    Those whose names are taken are not among them; see ``registrations``.
     """
-    # all descriptions of a package count: one that a build left in the checkout may be out of date
-    found: dict[str, str] = {}
-    owners: dict[str, str] = {}
-    for package in distributions():
-        for point in package.entry_points.select(group=CONTROLLER_GROUP):
-            owner = owners.setdefault(point.name, package.name)
-            if found.setdefault(point.name, point.value) != point.value and owner != package.name:
-                both = f"{found[point.name]} and {point.value}"
-                raise _unusable(f"{point.name!r}: {both}", "one for each name", "Rename one.")
-    return dict(sorted(found.items()))
+    return dict(registrations().usable)
+
+
+def surveyed_controllers() -> Survey:
+    """Return which of the registered controllers can be made with what is installed."""
+    found, available = registrations(), {}
+    left_out: list[InvalidValueError] = [*found.refused.values()]
+    for name, reference in found.usable.items():
+        try:
+            told_by(reference, TransportConfig())
+            available[name] = reference
+        except InvalidValueError as error:
+            left_out.append(named(name, error))
+    return Survey(available=available, left_out=tuple(left_out))
 
 
 def available_controllers() -> dict[str, str]:
     """Return those that can be made with the packages that are installed."""
-    return {name: each for name, each in registered_controllers().items() if _can_be_made(each)}
+    return dict(surveyed_controllers().available)
 
 
-def is_reference(name: str) -> bool:
-    """Whether a name is a ``module:factory``."""
-    return ":" in name
-
-
-def factory_at(reference: str) -> Any:
-    """Return what ``module:factory`` names; modules of the working directory are found, too.
+def told_by(reference: str, config: TransportConfig) -> Told:
+    """Return what the controller of a reference tells of itself, made for an environment.
 
     Raises:
-        ControllerError: there is no such module or nothing callable of that name in it. What a
-            module raises when it is imported comes through as it is.
+        ControllerError: it cannot be made, or tells something else than it may.
+        InstallationError: one of this package's needs a package that is not installed.
     """
-    module, _, name = reference.partition(":")
-    if not all(part.isidentifier() for part in (*module.split("."), name)):
-        raise _unusable(reference, "a name of the form module:factory", f"As in {_EXAMPLE}.")
-    _see_working_directory()
-    try:
-        imported = importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        if error.name is None or not f"{module}.".startswith(f"{error.name}."):
-            raise  # what it needs itself
-        raise _unusable(
-            reference,
-            "a module that can be imported",
-            f"There is no {error.name!r} here: install it, or run where it lies.",
-        ) from error
-    factory = getattr(imported, name, None)
-    if not callable(factory):
-        raise _unusable(reference, f"a function in {module}", f"It has no function {name!r}.")
-    return factory
+    controller = make_controller(reference, config)
+    identity_of(reference, controller)
+    knows = _attribute(reference, controller, "knows")
+    if knows is not None and not isinstance(knows, str):
+        raise ControllerError(f"knows of {reference}", knows, "a text", "Describe it in words.")
+    return Told(inner_loop=inner_loop_of(reference, controller), knows=knows)
 
 
-def make_controller(
-    reference: str, config: TransportConfig, certificate: Certificate | None = None
-) -> Controller:
-    """Return the controller that a factory makes; see ``Factory`` and ``BoundedFactory``.
-
-    Raises:
-        ControllerError: the reference leads nowhere, or to something without ``predict``.
-    """
-    factory = factory_at(reference)
-    made = factory(config) if certificate is None else factory(config, certificate=certificate)
-    if not callable(getattr(made, "predict", None)):
-        raise _unusable(
-            f"{reference} → {type(made).__name__}",
-            "a factory of objects with SB3's predict(observation, state, episode_start, "
-            "deterministic)",
-            "Return a controller.",
-        )
-    controller: Controller = made
-    return controller
-
-
-def summary_of(reference: str) -> str:
-    """Return the first sentence of a factory's docstring, without its full stop."""
-    text = (factory_at(reference).__doc__ or "").strip().partition("\n\n")[0]
-    return " ".join(text.split()).rstrip(".") or f"Made by {reference}"
+def named(name: str, error: InvalidValueError) -> InvalidValueError:
+    """Return an error about a registered controller's reference with its name and cause."""
+    told = type(error)(
+        f"controller {name!r}: {error.name}", error.value, error.allowed, error.remedy
+    )
+    told.__cause__ = error.__cause__ or error
+    return told
 
 
 def identity_of(reference: str, controller: Controller) -> dict[str, Any]:
@@ -139,7 +105,7 @@ def identity_of(reference: str, controller: Controller) -> dict[str, Any]:
     Raises:
         ControllerError: the attribute holds something else than JSON values.
     """
-    identity = getattr(controller, "identity", None)
+    identity = _attribute(reference, controller, "identity")
     told = {"controller": reference, "identity": identity}
     try:
         json.dumps(identity)
@@ -150,7 +116,7 @@ def identity_of(reference: str, controller: Controller) -> dict[str, Any]:
             "JSON values: mappings, lists, strings, numbers",
             f"{error}; write arrays as lists.",
         ) from error
-    if reference.startswith(f"{_OWN}."):
+    if is_own(reference):
         return told  # whose version is known to records
     return told | {"source": _digest(reference.partition(":")[0].partition(".")[0])}
 
@@ -162,8 +128,8 @@ def inner_loop_of(reference: str, controller: Controller) -> InnerLoopKind:
         ControllerError: there is no such inner loop.
     """
     kinds = get_args(InnerLoopKind)
-    kind = getattr(controller, "inner_loop", kinds[0])
-    if kind not in kinds:
+    kind = _attribute(reference, controller, "inner_loop", kinds[0])
+    if not isinstance(kind, str) or kind not in kinds:
         raise ControllerError(
             f"inner_loop of {reference}", kind, f"one of {', '.join(kinds)}", "See TransportConfig."
         )
@@ -172,7 +138,12 @@ def inner_loop_of(reference: str, controller: Controller) -> InnerLoopKind:
 
 def _digest(package: str) -> str:
     """Return the SHA-256 of a module's file, or of all Python files of a package."""
-    spec = find_spec(package)
+    try:
+        spec = find_spec(package)
+    except ValueError as error:  # of __main__, for one
+        raise ControllerError(
+            "controller's module", package, "one that an import finds", f"{error}."
+        ) from error
     folders = [] if spec is None else list(spec.submodule_search_locations or ())
     files = sorted(path for folder in folders for path in Path(folder).rglob("*.py"))
     if not folders and spec is not None and spec.origin is not None:
@@ -183,20 +154,14 @@ def _digest(package: str) -> str:
     return digest.hexdigest()
 
 
-def _can_be_made(reference: str) -> bool:
+def _attribute(
+    reference: str, controller: Controller, name: str, otherwise: object = None
+) -> object:
+    """Return an attribute of a controller, which may be a property that fails."""
     try:
-        make_controller(reference, TransportConfig())
-    except InstallationError:
-        return False
-    return True
-
-
-def _see_working_directory() -> None:
-    """Let modules of the working directory be imported; an installed command would not see them."""
-    here = str(Path.cwd())
-    if here not in sys.path and "" not in sys.path:
-        sys.path.append(here)
-
-
-def _unusable(reference: str, allowed: str, remedy: str) -> ControllerError:
-    return ControllerError("controller", reference, allowed, remedy)
+        return getattr(controller, name, otherwise)
+    except Exception as error:
+        allowed = "one that can be read, or none"
+        raise ControllerError(
+            f"{name} of the controller", reference, allowed, what_was_raised(error)
+        ) from error

@@ -10,7 +10,8 @@ import gymnasium
 
 from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
 from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.baselines.registry import inner_loop_of, make_controller, registered_controllers
+from defmanip_gym.baselines.factories import make_controller
+from defmanip_gym.baselines.registry import inner_loop_of, registered_controllers
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.certificates import (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from defmanip_gym.baselines.learned.card import AgentCard
 from defmanip_gym.baselines.learned.families import member_name
 from defmanip_gym.catalogue.config import AgentsConfig
 from defmanip_gym.catalogue.table import agents_table, card_table, scores_table
+from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation.agent_scores import scoring_commands, write_scores
 
 
@@ -21,7 +23,7 @@ def run_agents(config: AgentsConfig) -> None:
     """Print the agents' table, one agent's card, or which cards got scores.
 
     Raises:
-        AgentFileError: an agent that is missing or damaged.
+        AgentFileError: an agent or library that is missing or damaged.
         RecordError: no records to take scores from.
     """
     console = Console()
@@ -39,7 +41,11 @@ def run_agents(config: AgentsConfig) -> None:
 
 
 def _cards(config: AgentsConfig) -> dict[str, AgentCard]:
-    """Return the cards of all families by name."""
+    """Return the cards of all families by name; a library that is not there is no empty one."""
+    if not os.path.isdir(config.library):
+        raise AgentFileError(
+            "library", str(config.library), "a folder of families", "Check the path."
+        )
     return {
         f"{family}/{member_name(actor.card.seed)}": actor.card
         for family in shipped_families(config.library)

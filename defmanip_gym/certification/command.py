@@ -13,7 +13,9 @@ from defmanip_gym.certification.ladder import compute_ladder
 from defmanip_gym.certification.plot import save_plot
 from defmanip_gym.certification.table import ladder_table, numbers, remarks
 from defmanip_gym.errors import RecordError
-from defmanip_gym.files import write_atomically
+from defmanip_gym.files import require_writable, write_atomically
+
+NUMBERS_FILE = "certificates.json"
 
 
 def run_certify(config: CertifyConfig) -> Path:
@@ -28,6 +30,7 @@ def run_certify(config: CertifyConfig) -> Path:
     """
     console = Console()
     try:
+        require_writable(config.output / NUMBERS_FILE)
         with console.status("linearizing") as status:
             ladder = compute_ladder(config, status.update)
             console.print(ladder_table(ladder))
@@ -36,7 +39,7 @@ def run_certify(config: CertifyConfig) -> Path:
                 console.print(line, highlight=False)
             status.update("writing")
             content = json.dumps(numbers(config, ladder), indent=2, ensure_ascii=False)
-            write_atomically(config.output / "certificates.json", content.encode())
+            write_atomically(config.output / NUMBERS_FILE, content.encode())
             save_plot(config.output / "ladder.png", ladder)
     except KeyboardInterrupt:
         console.print("Stopped; nothing was written.")

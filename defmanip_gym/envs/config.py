@@ -31,11 +31,12 @@ class TransportConfig:
     """Arguments of the environment; see its documentation.
 
     Parameters may also be mappings of their fields, as the JSON of a Gymnasium specification holds
-    them. ``robot`` and ``beam`` are true, the beam but for what ``beam_ranges`` vary;
-    ``nominal_robot`` and ``nominal_beam`` are what the built-in feedback linearization believes. By
-    default it believes the truth, except that it counts on no damping at the root: overestimated
-    damping destabilizes the swing. ``inner_loop="measured_force"`` takes the grasp force as the
-    sensor reads it, noise included, in the place of any belief about the beam.
+    them; those that a mapping leaves out are as by default. ``robot`` and ``beam`` are true, the
+    beam but for what ``beam_ranges`` vary; ``nominal_robot`` and ``nominal_beam`` are what the
+    built-in feedback linearization believes. By default it believes the truth, except that it
+    counts on no damping at the root: overestimated damping destabilizes the swing.
+    ``inner_loop="measured_force"`` takes the grasp force as the sensor reads it, noise included, in
+    the place of any belief about the beam.
     """
 
     control_mode: ControlMode = "task"

@@ -10,13 +10,18 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 from rich.console import Console
 
+from defmanip_gym.baselines.registry import surveyed_controllers
 from defmanip_gym.display import progress_bar
 from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.assignments import assignments
 from defmanip_gym.evaluation.broken_certificates import broken_certificates
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestant import Contestant
-from defmanip_gym.evaluation.contestants import standard_contestants, standard_names
+from defmanip_gym.evaluation.contestants import (
+    require_undisputed,
+    standard_contestants,
+    standard_names_with,
+)
 from defmanip_gym.evaluation.filter_timings import FILTER_TIMING_FILE, measured_filter_times
 from defmanip_gym.evaluation.jobs import run_job
 from defmanip_gym.evaluation.learned_contestants import agent_contestants
@@ -48,11 +53,11 @@ def run_comparison(config: ComparisonConfig) -> Path:
     Raises:
         RecordError: the output folder cannot be used, or holds damaged or other records.
         ParameterError: unknown contestants.
-        ControllerError: a ``module:factory`` that leads to no controller.
+        ControllerError: a controller that was asked for cannot be made, or its name is disputed.
         AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
     console = Console()
-    contestants = _contestants(config)
+    contestants = _contestants(config, console)
     try:
         with _exclusive(config.output):
             records = _complete_records(config, contestants, console)
@@ -71,9 +76,13 @@ def run_comparison(config: ComparisonConfig) -> Path:
     return report
 
 
-def _contestants(config: ComparisonConfig) -> tuple[Contestant, ...]:
+def _contestants(config: ComparisonConfig, console: Console) -> tuple[Contestant, ...]:
     certificates = Certificates()
-    wanted = standard_names() if config.contestants is None else config.contestants
+    if config.contestants is None:
+        wanted = _everybody(console)
+    else:
+        wanted = config.contestants
+        require_undisputed(wanted)
     chosen = standard_contestants(wanted, certificates, config.member_limit)
     guests = chain.from_iterable(
         agent_contestants(
@@ -86,6 +95,14 @@ def _contestants(config: ComparisonConfig) -> tuple[Contestant, ...]:
     )
     by_name = {contestant.name: contestant for contestant in (*chosen, *guests)}
     return tuple(by_name.values())  # an agent named twice takes part once
+
+
+def _everybody(console: Console) -> tuple[str, ...]:
+    """Return the standard comparison's names, and say who cannot take part and why."""
+    survey = surveyed_controllers()
+    for error in survey.left_out:
+        console.print(f"Left out: {error}", soft_wrap=True, highlight=False, markup=False)
+    return standard_names_with(survey.available)
 
 
 def _print_broken(console: Console, records: Sequence[EpisodeRecord]) -> None:

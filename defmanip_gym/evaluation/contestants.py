@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+from defmanip_gym.baselines.factories import is_reference
 from defmanip_gym.baselines.learned.agents import load_family, shipped_families
-from defmanip_gym.baselines.registry import (
-    available_controllers,
-    is_reference,
-    registered_controllers,
-)
+from defmanip_gym.baselines.registrations import REFERENCES, registrations
+from defmanip_gym.baselines.registry import available_controllers, named, registered_controllers
+from defmanip_gym.errors import ControllerError, InstallationError
 from defmanip_gym.evaluation.analytic_contestants import controller_contestant
 from defmanip_gym.evaluation.contestant import Contestant, Member
 from defmanip_gym.evaluation.controllers import Random, Zero
@@ -34,14 +33,15 @@ _PAPERS_OPTIONS = (*STORAGE_FILTERS, *CERTIFICATES)
 def standard_names() -> tuple[str, ...]:
     """Return the names of the contestants of the standard comparison, in order.
 
-    Controllers that need a package that is not installed are left out; asked for, they say which.
+    Controllers that cannot be made here are left out; asked for, they say why.
     """
-    return _standard_names_of(available_controllers())
+    return standard_names_with(available_controllers())
 
 
-def _standard_names_of(controllers: Iterable[str]) -> tuple[str, ...]:
+def standard_names_with(controllers: Iterable[str]) -> tuple[str, ...]:
+    """Return what the standard comparison is with these of the registered controllers."""
     analytic = (n for name in controllers for n in _shown_controller(name))
-    return ("zero", "random", *analytic, *(n for f in shipped_families() for n in _shown(f)))
+    return (*REFERENCES, *analytic, *(n for f in shipped_families() for n in _shown(f)))
 
 
 def _shown_controller(name: str) -> tuple[str, ...]:
@@ -78,7 +78,16 @@ def known_names() -> tuple[str, ...]:
     families, registered = shipped_families(), registered_controllers()
     bases = (*registered, *families, *(other for f in families for other in _on_the_other(f)))
     every = (name for base in bases for name in (base, *(f"{base}/{o}" for o in OPTIONS)))
-    return tuple(dict.fromkeys((*_standard_names_of(registered), *every)))
+    return tuple(dict.fromkeys((*standard_names_with(registered), *every)))
+
+
+def require_undisputed(names: Iterable[str]) -> None:
+    """Raise ControllerError if a name asked for is one that an installed package may not give."""
+    refused = registrations().refused
+    for name in names:
+        for other, error in refused.items():
+            if name == other or name.startswith((f"{other}/", f"{other}{INNER_LOOP_MARK}")):
+                raise error
 
 
 def standard_contestants(
@@ -94,11 +103,11 @@ def standard_contestants(
 
     Raises:
         ParameterError: an unknown name.
-        ControllerError: a ``module:factory`` that leads to no controller.
+        ControllerError: a ``module:factory`` or a registered one that leads to no controller.
         AgentFileError: an agent cannot be loaded or does not fit the environment.
     """
     guests = tuple(dict.fromkeys(name for name in names if is_reference(name)))
-    known = known_names()
+    known, registered = known_names(), registered_controllers()
     for name in names:
         if name in guests:
             method = name.partition("/")[2]
@@ -106,18 +115,23 @@ def standard_contestants(
         else:
             require_choice("contestants", name, known)
     wanted = (*(name for name in known if name in set(names)), *guests)
-    return tuple(_contestant(name, certificates, member_limit) for name in wanted)
+    return tuple(_contestant(name, registered, certificates, member_limit) for name in wanted)
 
 
-def _contestant(name: str, certificates: Certificates, member_limit: int | None) -> Contestant:
+def _contestant(
+    name: str, registered: Mapping[str, str], certificates: Certificates, member_limit: int | None
+) -> Contestant:
     base, _, method = name.partition("/")
     if base in _REFERENCES:
         return _REFERENCES[base]
     if is_reference(base):
         return controller_contestant(base, base, method, certificates)
-    registered = registered_controllers()
     if base in registered:
-        return controller_contestant(base, registered[base], method, certificates)
+        try:
+            return controller_contestant(base, registered[base], method, certificates)
+        except (ControllerError, InstallationError) as error:
+            told = named(base, error)
+            raise told from told.__cause__
     return family_contestant(name, certificates, member_limit)
 
 

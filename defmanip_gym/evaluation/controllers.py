@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS
 from defmanip_gym.baselines.controller import Controller, RandomController, State, ZeroController
+from defmanip_gym.baselines.factories import make_controller
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.deployment import controller_of, corrected_by
 from defmanip_gym.baselines.learned.sb3_zip import load_sb3_zip
-from defmanip_gym.baselines.registry import identity_of, make_controller
+from defmanip_gym.baselines.registry import identity_of
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.evaluation.conditions import NOMINAL
 from defmanip_gym.theory.certificates import Certificate

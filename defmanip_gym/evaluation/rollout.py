@@ -11,10 +11,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from defmanip_gym.baselines.controller import Controller
+from defmanip_gym.baselines.controller import Controller, State
+from defmanip_gym.baselines.factories import is_own, what_was_raised
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
-from defmanip_gym.errors import ActionError
+from defmanip_gym.errors import ActionError, ControllerError, DefmanipError
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM
 from defmanip_gym.evaluation.course import Course, CourseRecorder
 from defmanip_gym.evaluation.entry import Entry
@@ -83,6 +84,10 @@ def rollout(
 
     Returns:
         The episodes in the order of the scenarios.
+
+    Raises:
+        ControllerError: what somebody else's ``predict`` raised.
+        ActionError: a controller's action has another shape or is not finite.
     """
     horizon_s = require_positive("horizon_s", horizon_s, "s")
     happened = courses(
@@ -129,6 +134,10 @@ def courses(
         safety_filter: around the environment; None runs without one.
         delay_periods: control periods by which actions, filtered ones too, take effect later.
         num_threads: physics threads, 0 for one per CPU.
+
+    Raises:
+        ControllerError: what somebody else's ``predict`` raised.
+        ActionError: a controller's action has another shape or is not finite.
     """
     count = len(seeds)
     transport = _environment(config, count, steps, num_threads)
@@ -147,10 +156,8 @@ def courses(
     episode_start, state = running.copy(), None
     try:
         while running.any():
-            actions, state = controller.predict(
-                observation, state, episode_start, deterministic=True
-            )
-            actions = np.where(running[:, None], _checked(actions, count), 0.0)
+            decided, state = _decision(controller, observation, state, episode_start)
+            actions = np.where(running[:, None], _checked(decided, count), 0.0)
             episode_start = np.zeros_like(running)
             after, reward, terminated, truncated, info = env.step(actions)
             observation = np.where(running[:, None], after, observation)
@@ -160,6 +167,28 @@ def courses(
     finally:
         env.close()
     return tuple(recorder.course(index) for index in range(count))
+
+
+def _decision(
+    controller: Controller,
+    observation: Array,
+    state: State | None,
+    episode_start: BoolArray,
+) -> tuple[object, State | None]:
+    """Return a controller's actions and state; what others' code raises as an error of ours."""
+    try:
+        actions, state = controller.predict(observation, state, episode_start, deterministic=True)
+    except Exception as error:
+        kind = type(controller)
+        if isinstance(error, DefmanipError) or is_own(kind.__module__):
+            raise
+        raise ControllerError(
+            "predict of the controller",
+            f"{kind.__module__}:{kind.__qualname__}",
+            "predict(observation, state, episode_start, deterministic) → (actions, state)",
+            what_was_raised(error),
+        ) from error
+    return actions, state
 
 
 def _checked(actions: object, count: int) -> Array:

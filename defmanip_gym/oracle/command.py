@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from defmanip_gym.files import write_atomically
+from defmanip_gym.errors import RecordError
+from defmanip_gym.files import require_writable, write_atomically
 from defmanip_gym.oracle.config import PlanConfig
 from defmanip_gym.oracle.page import optimum_page
 from defmanip_gym.planning.limits import NO_MARGINS
@@ -26,18 +30,23 @@ def run_plan(config: PlanConfig) -> StoredPlans:
     Raises:
         InstallationError: CasADi is not installed.
         ParameterError: a start without plan, or an unknown suite.
-        RecordError: the file exists and is no file of plans.
+        RecordError: the file exists and is no file of plans, or file or page cannot be written.
     """
-    setting, console = PlanningSetting(), Console()
+    setting, console, starts = PlanningSetting(), Console(), config.starts
+    places = {"output": config.output, "page": config.page}
+    for option, path in places.items():
+        if path is not None:
+            with _writing(option, path):
+                require_writable(path)
     plans = _begun(config, setting)
-    starts = config.starts
     for number, start in enumerate(starts, start=1):
         if plans.find(start) is not None:
             continue
         begun = time.perf_counter()
         found = planned(setting, start, config)
         plans = plans.including(found)
-        write_plans(config.output, plans)
+        with _writing("output", config.output):
+            write_plans(config.output, plans)
         console.print(
             f"{number}/{len(starts)}: T* {found.optimum_s:.3f} s ({found.optimal_guess}), "
             f"to be driven in {found.drive.duration_s:.3f} s; "
@@ -45,7 +54,9 @@ def run_plan(config: PlanConfig) -> StoredPlans:
             highlight=False,
         )
     if config.page is not None:
-        write_atomically(config.page, optimum_page(plans, config.chosen).encode())
+        page = optimum_page(plans, config.chosen)
+        with _writing("page", config.page):
+            write_atomically(config.page, page.encode())
     return plans
 
 
@@ -74,6 +85,15 @@ def made_with(config: PlanConfig, setting: PlanningSetting) -> dict[str, Any]:
         "casadi": str(require_casadi().__version__),
         "package": __version__,
     }
+
+
+@contextmanager
+def _writing(option: str, path: Path) -> Iterator[None]:
+    """Raise RecordError for what cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordError(option, str(path), "a file that can be written", f"{error}.") from error
 
 
 def _begun(config: PlanConfig, setting: PlanningSetting) -> StoredPlans:

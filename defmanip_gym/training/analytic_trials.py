@@ -10,7 +10,8 @@ import optuna
 from gymnasium.vector import AutoresetMode
 
 from defmanip_gym.baselines.controller import Controller
-from defmanip_gym.baselines.registry import inner_loop_of, make_controller, registered_controllers
+from defmanip_gym.baselines.factories import make_controller
+from defmanip_gym.baselines.registry import inner_loop_of, registered_controllers
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
 from defmanip_gym.errors import GainError

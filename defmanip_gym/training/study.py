@@ -11,11 +11,8 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
-from defmanip_gym.baselines.registry import (
-    identity_of,
-    make_controller,
-    registered_controllers,
-)
+from defmanip_gym.baselines.factories import make_controller
+from defmanip_gym.baselines.registry import identity_of, registered_controllers
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.training.hyperparameters import load_hyperparameters

@@ -1,52 +1,23 @@
-"""Controllers by name: what is registered, and what ``module:factory`` leads to."""
+"""Controllers by name: who is registered, who may have a name, and who can be made."""
 
 import sys
 
 import numpy as np
 import pytest
+from strangers import install
 
 from defmanip_gym.baselines.controller import ZeroController
+from defmanip_gym.baselines.factories import make_controller
+from defmanip_gym.baselines.registrations import registrations
 from defmanip_gym.baselines.registry import (
     available_controllers,
-    factory_at,
     identity_of,
-    make_controller,
     registered_controllers,
-    summary_of,
+    surveyed_controllers,
 )
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import ControllerError
-from defmanip_gym.evaluation.contestants import known_names, standard_contestants
-from defmanip_gym.evaluation.protection import Certificates
-
-MODULE = '''
-from defmanip_gym.baselines.controller import ZeroController
-
-def make_controller(config):
-    """Does nothing,
-    and does it well.
-
-    More on that.
-    """
-    return ZeroController()
-
-def make_none(config):
-    return None
-'''
-
-
-@pytest.fixture
-def strangers(tmp_path, monkeypatch):
-    """Return a function that writes a module into the working directory and names it."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
-
-    def write(text=MODULE, name="strangers_module"):
-        (tmp_path / f"{name}.py").write_text(text)
-        monkeypatch.delitem(sys.modules, name, raising=False)
-        return f"{name}:make_controller"
-
-    return write
+from defmanip_gym.evaluation.contestants import known_names
 
 
 def test_every_registered_controller_can_be_made():
@@ -60,45 +31,6 @@ def test_one_whose_package_is_missing_is_not_available(monkeypatch):
     assert "mpc" not in available_controllers()
 
 
-def test_a_strangers_controller_is_made_from_the_working_directory(strangers):
-    reference = strangers()
-    action, _ = make_controller(reference, TransportConfig()).predict(np.zeros((2, 21)))
-    assert action.shape == (2, 3)
-    assert summary_of(reference) == "Does nothing, and does it well"
-
-
-def test_another_source_is_another_controller(strangers):
-    reference = strangers()
-    controller = make_controller(reference, TransportConfig())
-    before = identity_of(reference, controller)
-    strangers(MODULE + "# changed\n")
-    assert identity_of(reference, controller) != before
-
-
-@pytest.mark.parametrize(
-    "reference, told",
-    [
-        ("no_such_module:make", "no_such_module"),
-        ("strangers_module:nothing", "no function 'nothing'"),
-        ("strangers_module:make_none", "predict"),
-        ("strangers_module.below:make", "strangers_module"),
-        (":make", "module:factory"),
-        ("strangers_module:", "module:factory"),
-        ("a b:c", "module:factory"),
-    ],
-)
-def test_a_reference_that_leads_nowhere_says_why(strangers, reference, told):
-    strangers()
-    with pytest.raises(ControllerError, match=told):
-        make_controller(reference, TransportConfig())
-
-
-def test_what_a_module_itself_lacks_is_its_own_error(strangers):
-    reference = strangers("import something_that_nobody_has\n")
-    with pytest.raises(ModuleNotFoundError, match="something_that_nobody_has"):
-        factory_at(reference)
-
-
 def test_an_identity_that_json_cannot_hold_is_refused():
     class Unclear(ZeroController):
         identity = {"gains": np.zeros(3)}
@@ -109,26 +41,51 @@ def test_an_identity_that_json_cannot_hold_is_refused():
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """Install a package that registers a controller that cannot be made."""
+    """Return a function that installs a package with controllers, and return what is refused."""
+    monkeypatch.syspath_prepend(tmp_path)
 
-    def install(name):
-        described = tmp_path / "somebody-1.0.dist-info"
-        described.mkdir()
-        (described / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
-        registered = f"[defmanip_gym.controllers]\n{name} = nowhere:make\n"
-        (described / "entry_points.txt").write_text(registered)
-        monkeypatch.syspath_prepend(tmp_path)
+    def refused(package="somebody", **controllers):
+        install(tmp_path, package, **controllers)
+        return registrations().refused
 
-    return install
+    return refused
 
 
-def test_two_controllers_of_one_name_are_refused(installed):
-    installed("lqr")
-    with pytest.raises(ControllerError, match="nowhere:make"):
-        registered_controllers()
+BASES = sorted({name.partition("/")[0].partition("@")[0] for name in known_names()})
 
 
-def test_what_somebodys_package_cannot_make_is_no_obstacle_to_others(installed):
-    installed("theirs")
-    (zero,) = standard_contestants(["zero"], Certificates())
-    assert zero.name == "zero" and "theirs" in known_names()
+@pytest.mark.parametrize("name", [*BASES, "storage", "backup", "cbf_qp", "l1", "phase_plane"])
+def test_names_of_this_package_stay_its_own(installed, name):
+    before = registered_controllers()
+    error = installed(**{name: "nowhere:make"})[name]
+    assert registered_controllers() == before
+    for part in ("somebody", "nowhere:make", "defmanip_gym", repr(name), "Rename"):
+        assert part in str(error)
+
+
+@pytest.mark.parametrize("name", ["a/b", "a@b", "a:b", "a b", "a+b", "-a", ".."])
+def test_names_that_would_mean_something_else_are_refused(installed, name):
+    assert "letters" in installed(**{name: "nowhere:make"})[name].allowed
+    assert name not in registered_controllers()
+
+
+def test_two_packages_cannot_share_a_name(installed):
+    installed(theirs="nowhere:make")
+    error = installed("nobody", theirs="elsewhere:make", other="elsewhere:make")["theirs"]
+    for part in ("somebody", "nobody", "nowhere:make", "elsewhere:make"):
+        assert part in str(error)
+    assert "theirs" not in registered_controllers() and "other" in registered_controllers()
+
+
+def test_a_name_that_nobody_else_has_is_registered(installed):
+    reference = "defmanip_gym.baselines.analytic.field:make_controller"
+    assert not installed(**{"my-field_2.0": reference})
+    assert available_controllers()["my-field_2.0"] == reference
+
+
+def test_what_cannot_be_made_is_left_out_and_says_why(installed):
+    installed(theirs="nowhere:make")
+    survey = surveyed_controllers()
+    assert "theirs" not in survey.available and "field" in survey.available
+    (error,) = (each for each in survey.left_out if each.name.startswith("controller 'theirs'"))
+    assert "There is no 'nowhere'" in str(error)

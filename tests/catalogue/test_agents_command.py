@@ -101,6 +101,7 @@ def test_an_agent_of_ones_own_is_shown_by_its_path(answer, library):
         (["--score", "nowhere"], "evaluate.py"),
         (["ppo", "--score", "nowhere"], "without a name"),
         (["--score", "nowhere", "--library", "nowhere"], "evaluate.py"),
+        (["--library", "nowhere"], "a folder of families"),
     ],
 )
 def test_wrong_input_gets_a_message(words, said, monkeypatch, capsys):

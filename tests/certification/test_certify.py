@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 from defmanip_gym.attack import certificate as certificate_module
 from defmanip_gym.attack.result import AttackResult
 from defmanip_gym.attack.target import InputLimits, PlantFactors
+from defmanip_gym.certification import command, table
 from defmanip_gym.certification import ladder as ladder_module
-from defmanip_gym.certification import table
 from defmanip_gym.certification.command import run_certify
 from defmanip_gym.certification.config import CertifyConfig
 from defmanip_gym.certification.ladder import compute_ladder
 from defmanip_gym.certification.phase_plot import draw_phase, has_phase_plane
 from defmanip_gym.cli import main
-from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError
+from defmanip_gym.errors import CertificateError, ObjectFileError, ParameterError, RecordError
 from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.theory.certificates import CERTIFICATE_METHODS
 from defmanip_gym.theory.filters.family import STORAGE_FILTERS
@@ -145,6 +145,14 @@ def test_of_a_file_with_one_hinge_it_says_why_phase_plane_does_not_serve(tmp_pat
     assert "needs a beam" in printed and "no room left" not in printed
     with pytest.raises(CertificateError, match="ask for less"):
         ladder(mjcf=path, attack=False, initial_swing=0.6)
+
+
+def test_an_output_that_is_a_file_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(command, "compute_ladder", lambda *_: pytest.fail("computed"))
+    for output in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(RecordError, match="a folder that can be written"):
+            run_certify(CertifyConfig(output=output))
 
 
 def attacked_above(limit):

@@ -112,7 +112,7 @@ def test_certificate_is_what_its_json_says(method):
     [
         ("beam", {"mass": 1.0}, "beam"),
         ("beam", {"mass_kg": -1.0}, "mass_kg"),
-        ("robot", {"upper_arm": {"length_m": 1.0}}, "upper_arm"),
+        ("robot", {"upper_arm": {"length": 1.0}}, "upper_arm"),
         ("task", {"reward": {"bonus": 1.0}}, "reward"),
         ("task", {1: 2}, "task"),
         ("beam", [("mass_kg", 1.0)], "beam"),

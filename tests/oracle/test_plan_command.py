@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from defmanip_gym.errors import RecordError
 from defmanip_gym.evaluation.suites import suite_named
 from defmanip_gym.oracle import command
 from defmanip_gym.oracle.command import run_plan
@@ -37,6 +38,19 @@ def test_other_settings_begin_anew(config):
     other = replace(config, search=replace(QUICK, fine_intervals=30))
     assert run_plan(other).plans[0].drive.commands.shape == (30, 3)
     assert plans.made_with != run_plan(other).made_with
+
+
+@pytest.mark.parametrize("option", ["output", "page"])
+@pytest.mark.parametrize("place", ["", "file/below", "x" * 300], ids=["folder", "file", "long"])
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_planned(
+    tmp_path, monkeypatch, option, place
+):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(command, "planned", lambda *_: pytest.fail("planned"))
+    config = PlanConfig(output=tmp_path / "plans.npz", suites=("paper",), fresh=True)
+    with pytest.raises(RecordError, match=f"{option} is .*can be written"):
+        run_plan(replace(config, **{option: tmp_path / place}))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_starts_are_planned_for_once():

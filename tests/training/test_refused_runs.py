@@ -78,6 +78,13 @@ def test_no_run_trains_on_starts_that_agents_are_judged_on(config):
     venv.close()
 
 
+def test_an_output_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "file").touch()
+    for output in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(RunFolderError, match="a writable folder"):
+            RunFolder.create(TrainConfig(output=output), {}, "train")
+
+
 def test_incomplete_hyperparameters_are_refused_and_leave_nothing(config, tmp_path):
     path = tmp_path / "short.yml"
     path.write_text(yaml.safe_dump({ENV_ID: {"policy": "MlpPolicy"}}))

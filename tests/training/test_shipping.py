@@ -103,6 +103,12 @@ def test_one_bad_run_and_nothing_is_shipped(run, library, bad, error, said):
     assert not library.exists()
 
 
+def test_a_library_that_is_a_file_is_refused(run, library):
+    library.touch()
+    with pytest.raises(RunFolderError, match="a file that can be written"):
+        ship(ShipConfig(runs=(run(0),), library=library))
+
+
 def test_new_agents_must_go_with_those_that_stay(run, library):
     ship(ShipConfig(runs=(run(0),), library=library))
     for name, value in {"hyperparameters": {"n_envs": 3}, "sources": "another"}.items():
