@@ -13,7 +13,7 @@ from defmanip_gym.validation import require_between, require_params, require_pos
 
 @dataclass(frozen=True, kw_only=True)
 class MpcParams(WayLawParams):
-    """Design choices of ``mpc``.
+    """Design choices of ``mpc``; with ``HorizonWeights``' they are what a study found.
 
     Attributes:
         way: the reference; its braking is the program's business, so it brakes hard.
@@ -27,7 +27,11 @@ class MpcParams(WayLawParams):
 
     way: WayParams = field(
         default_factory=lambda: WayParams(
-            deceleration_m_s2=6.0, vertical_deceleration_m_s2=0.35, approach_rate_per_s=8.0
+            turn_radius_m=3.76,
+            yaw_rate_rad_s=2.36,
+            deceleration_m_s2=3.22,
+            vertical_deceleration_m_s2=2.56,
+            approach_rate_per_s=8.68,
         )
     )
     blocks: tuple[int, ...] = HORIZON_BLOCKS

@@ -24,14 +24,14 @@ class HorizonWeights:
         terminal_s: how much longer than its block the last point counts.
     """
 
-    position: float = 10.0
-    velocity: float = 1.0
-    swing: float = 0.03
-    swing_rate: float = 0.006
+    position: float = 26.4
+    velocity: float = 0.195
+    swing: float = 0.0093
+    swing_rate: float = 0.0242
     acceleration: float = 0.02
-    heading: float = 10.0
+    heading: float = 0.59
     heading_radius_m: float = 0.5
-    terminal_s: float = 0.5
+    terminal_s: float = 0.906
 
     def __post_init__(self) -> None:
         for name in ("position", "acceleration", "heading_radius_m"):
