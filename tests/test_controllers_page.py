@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from defmanip_gym.baselines.analytic import field
 from defmanip_gym.baselines.analytic.mpc import MpcParams
 from defmanip_gym.baselines.analytic.way_params import WayParams
 
@@ -26,3 +27,9 @@ def test_the_numbers_in_words_are_the_defaults():
     assert f"|φ| ≤ {MpcParams().sigma_share:g} σ" in PAGE
     assert f"beyond {MpcParams().heading_share:g} of its tolerance" in PAGE
     assert f"within {WayParams().settling_radius_m:g} m of the goal" in PAGE
+
+
+@pytest.mark.parametrize("name", ["tanner", "field", "lqr", "shaped", "mpc", "time_optimal"])
+def test_each_law_is_one_file_that_is_read_in_one_go(name):
+    file = Path(field.__file__).with_name(f"{name}.py")
+    assert len(file.read_text().splitlines()) <= 150

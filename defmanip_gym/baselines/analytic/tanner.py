@@ -94,14 +94,9 @@ class TannerController:
     @property
     def identity(self) -> dict[str, Any]:
         """What its behaviour depends on, as JSON values."""
-        certificate = self.certificate
-        return {
-            "params": asdict(self.params),
-            "beam": asdict(self.beam),
-            "robot": asdict(self.robot),
-            "task": asdict(self.task),
-            "certificate": None if certificate is None else asdict(certificate),
-        }
+        certificate = None if self.certificate is None else asdict(self.certificate)
+        parts = ("params", "beam", "robot", "task")
+        return {name: asdict(getattr(self, name)) for name in parts} | {"certificate": certificate}
 
     def predict(
         self,
