@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+import math
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from defmanip_gym.params import DisturbanceParams
 from defmanip_gym.validation import require_range, settle
 
 _FORCE_N = 1e4
-_MOST = 1e9  # of frequencies and noises
+_MOST = 1e6  # of frequencies and noises, as DisturbanceParams has it
+_BESIDE = 0.999  # of a frequency whose samples would all be zero
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +53,20 @@ class DisturbanceRanges:
             }
         )
 
+    def worst(
+        self, disturbance: DisturbanceParams, period_s: float
+    ) -> tuple[DisturbanceParams, ...]:
+        """Return those of which one is the worst for what foresees a control period, s.
+
+        That are the largest values, but with the frequency that changes the force most from period
+        to period, and the bias at either end: it may add to an error of its own, or take from it.
+        """
+        ends = self.force_frequency_rad_s
+        frequency = disturbance.force_frequency_rad_s if ends is None else _wildest(ends, period_s)
+        largest = replace(self.largest(disturbance), force_frequency_rad_s=frequency)
+        biases = self.force_bias_n or (disturbance.force_bias_n,)
+        return tuple(replace(largest, force_bias_n=bias) for bias in dict.fromkeys(biases))
+
     def sample(
         self, disturbance: DisturbanceParams, generator: np.random.Generator
     ) -> DisturbanceParams:
@@ -67,3 +83,13 @@ class DisturbanceRanges:
     @property
     def _ends(self) -> list[tuple[str, tuple[float, float] | None]]:
         return [(field.name, getattr(self, field.name)) for field in fields(self)]
+
+
+def _wildest(ends: tuple[float, float], period_s: float) -> float:
+    """Return the frequency between two at which samples of a sine differ most from the last."""
+    low, high = ends
+    turning = math.pi / period_s  # at its odd multiples samples change their signs
+    odd = 2 * math.ceil(0.5 * (low / turning - 1)) + 1
+    if odd * turning <= high:
+        return odd * turning * _BESIDE
+    return min(ends, key=lambda frequency: abs(frequency / turning % 2 - 1))

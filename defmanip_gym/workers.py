@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +16,7 @@ from joblib._parallel_backends import LokyBackend
 from joblib.parallel import get_active_backend
 
 _PATIENCE_S = 5.0
+_GLANCE_S = 1.0  # between looks at whether the process that started a worker is there
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -35,8 +38,7 @@ def running(
     threads_before = set(threading.enumerate())
     arguments: dict[str, Any] = {}
     if isinstance(backend, LokyBackend):
-        # Ctrl-C is for this process, which ends the others; this is for workers that come later
-        arguments = {"initializer": signal.signal, "initargs": (signal.SIGINT, signal.SIG_IGN)}
+        arguments = {"initializer": _begin_worker, "initargs": (os.getpid(),)}
     parallel = joblib.Parallel(
         n_jobs=processes or -1, return_as="generator_unordered", batch_size=1, **arguments
     )
@@ -52,6 +54,22 @@ def running(
         raise
     else:
         _close(results)
+
+
+def _begin_worker(starter: int) -> None:
+    """Leave Ctrl-C to the process that started this one, and end when it is gone.
+
+    One that was killed cannot end its workers, which would go on unseen, beside those that go on
+    with their work.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_after, args=(starter,), daemon=True).start()
+
+
+def _end_after(starter: int) -> None:
+    while os.getppid() == starter:
+        time.sleep(_GLANCE_S)
+    os._exit(1)
 
 
 def _close(results: Any) -> None:

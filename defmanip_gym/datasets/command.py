@@ -24,7 +24,7 @@ from defmanip_gym.datasets.writer import new_dataset
 from defmanip_gym.display import progress_bar
 from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.contestants import standard_contestants
-from defmanip_gym.evaluation.learned_contestants import agent_contestants
+from defmanip_gym.evaluation.learned_contestants import agent_as_trained
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.version import UNKNOWN_REVISION, __version__, git_revision
 
@@ -115,7 +115,7 @@ def _contestants(config: DatasetConfig) -> tuple[Contestant, ...]:
     certificates = Certificates()
     made = standard_contestants(config.contestants, certificates, config.member_limit)
     by_name = {contestant.name: contestant for contestant in made}
-    agents = (agent_contestants(path, certificates)[0] for path in config.agents)
+    agents = (agent_as_trained(path, certificates) for path in config.agents)
     return (*(by_name[name] for name in config.contestants), *agents)
 
 

@@ -47,7 +47,8 @@ class DatasetConfig:
     contestants: tuple[str, ...] = ()
     """Who controls, as evaluate.py --contestants names them; several give a mixture."""
     agents: tuple[Path, ...] = ()
-    """Run folders or .safetensors files of further agents that control."""
+    """Run folders or .safetensors files of further agents that control, each inside the filter
+    that it learned in, if any."""
     shares: tuple[float, ...] | None = None
     """Shares of the episodes, one for each contestant and then each agent; equal by default."""
     members: int | Literal["all"] = 1

@@ -41,7 +41,10 @@ def memory_of(layer: Any) -> dict[str, Any]:
 
 
 def require_memory(layer: Any, memory: object) -> None:
-    """Raise StateError unless such a memory can be given to a wrapper."""
+    """Raise StateError unless such a memory can be given to a wrapper.
+
+    Its class may ask for more of it, in a method ``require_memory``.
+    """
     noted = set(_noted(layer))
     if not isinstance(memory, Mapping) or set(memory) != noted:
         raise StateError(
@@ -53,6 +56,8 @@ def require_memory(layer: Any, memory: object) -> None:
     for name, kept in memory.items():
         if _is_part(value := getattr(layer, name)):
             require_memory(value, kept)
+    if hasattr(type(layer), "require_memory"):
+        layer.require_memory(memory)
 
 
 def give_memory(layer: Any, memory: Mapping[str, Any]) -> None:

@@ -35,7 +35,8 @@ from defmanip_gym.evaluation.protection import (
 from defmanip_gym.evaluation.rollout import ACTION_SIZE
 from defmanip_gym.observation import ObservationLayout
 
-_OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance"})  # env_kwargs
+# env_kwargs
+_OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance", "disturbance_ranges"})
 
 
 def family_contestant(
@@ -96,14 +97,31 @@ def agent_contestants(
             "normalization", normalization, f"nothing with {path}", "It is no zip file of SB3."
         )
     actor = load_agent(path)
+    return _guest(path, actor, "", certificates), _guest(path, actor, FILTER_OPTION, certificates)
+
+
+def agent_as_trained(path: Path, certificates: Certificates) -> Contestant:
+    """Return an agent of the user's, inside the filter that it learned in, if any.
+
+    Raises:
+        AgentFileError: the agent cannot be loaded or does not fit the environment.
+    """
+    actor = load_agent(path)
+    return _guest(path, actor, actor.card.safety_filter or "", certificates)
+
+
+def _guest(path: Path, actor: MlpActor, method: str, certificates: Certificates) -> Contestant:
     folder = path.resolve() if path.is_dir() else path.resolve().parent
     name = f"{folder.name}@{actor.digest}"
-    about = f"{actor.card.algorithm} agent made by `{actor.card.command}`"
-    kind = training_config(actor.card).inner_loop
-    plain = _learned(name, (actor,), "", about, GUEST_COLOURS[0], certificates, kind)
-    option = f"{name}/{FILTER_OPTION}"
-    colour = GUEST_COLOURS[1]
-    return plain, _learned(option, (actor,), FILTER_OPTION, about, colour, certificates, kind)
+    return _learned(
+        f"{name}/{method}" if method else name,
+        (actor,),
+        method,
+        f"{actor.card.algorithm} agent made by `{actor.card.command}`",
+        GUEST_COLOURS[bool(method)],
+        certificates,
+        training_config(actor.card).inner_loop,
+    )
 
 
 def _sb3_contestants(
@@ -146,10 +164,12 @@ def _learned(
     protection = protection_named(method, certificates, inner_loop)
     trained_in = actors[0].card.certificate
     is_residual = actors[0].card.residual_authority_m_s2 is not None
-    # outside of a certificate the paper's controller under a residual still is the training's
-    below = None if protection is None else protection.certificate
-    if below is None and trained_in in CERTIFICATES:
-        below = certificates.named(trained_in)
+    # the paper's controller under a residual keeps to the certificate around it, or the training's
+    below = None
+    if is_residual and trained_in is not None:
+        below = None if protection is None else protection.certificate
+        if below is None and trained_in in CERTIFICATES:
+            below = certificates.named(trained_in)
     knows = [_seen_in_training(actors[0].card)]
     if is_residual:
         knows.append("the controller under it knows the nominal robot and beam")
@@ -163,7 +183,7 @@ def _learned(
         members=tuple(
             Member(
                 name=str(actor.card.seed),
-                controller=Learned(actor, below if is_residual else None),
+                controller=Learned(actor, below),
             )
             for actor in actors
         ),

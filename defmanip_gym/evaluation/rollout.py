@@ -223,4 +223,5 @@ def _environment(
         nominal_beam=config.nominal_beam,
         task=config.task,
         disturbance=config.disturbance,
+        disturbance_ranges=config.disturbance_ranges,
     )

@@ -47,8 +47,8 @@ def _require_whole(name: str, actor: MlpActor) -> None:
             name,
             "one whose action depends on the observation alone",
             "A residual agent's network gives corrections, held for "
-            f"{actor.card.residual_decision_periods} periods, of the paper's controller, which has "
-            "a memory: without them the file would be another agent. Use load_controller.",
+            f"{actor.card.residual_decision_periods} periods, of {actor.card.residual_base!r}, "
+            "which has a memory: without it the file would be another agent. Use load_controller.",
         )
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +14,7 @@ from rich.console import Console
 
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.training.config import TrainConfig
+from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.run_folder import RunFolder
 from defmanip_gym.training.train import train
 from defmanip_gym.training.trainings_config import TrainingsConfig
@@ -49,11 +53,12 @@ def train_or_go_on(config: TrainConfig) -> Path:
     Nobody else trains it meanwhile: whoever comes second waits, and finds it done.
 
     Raises:
-        RunFolderError: the folder holds a run with other settings or from other sources.
+        ParameterError: hyperparameters that cannot be used.
+        RunFolderError: the folder cannot be written, or holds a run with other settings or
+            hyperparameters, or from other sources.
     """
     folder = RunFolder.named(config)
-    folder.path.parent.mkdir(parents=True, exist_ok=True)
-    with FileLock(folder.path.with_name(f".{folder.path.name}.lock")):
+    with _only_one(folder):
         if not folder.path.exists():
             return train(config, shows_progress=False)
         _require_the_same(folder, config)
@@ -66,14 +71,33 @@ def train_or_go_on(config: TrainConfig) -> Path:
         return train(again, shows_progress=False)
 
 
+@contextmanager
+def _only_one(folder: RunFolder) -> Iterator[None]:
+    """Wait until nobody else trains a run."""
+    lock = FileLock(folder.path.with_name(f".{folder.path.name}.lock"))
+    try:
+        folder.path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire()
+    except OSError as error:
+        raise RunFolderError(
+            "output", str(folder.path.parent), "a writable folder", f"{error}."
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
 def _require_the_same(folder: RunFolder, config: TrainConfig) -> None:
-    """Raise RunFolderError unless a run was begun with these settings."""
-    stored = folder.read_config().train
-    # where it lies and how many threads it has change nothing; the file's content is stored
+    """Raise RunFolderError unless a run was begun with these settings and hyperparameters."""
+    run = folder.read_config()
+    stored = run.train
+    # where it lies and how many threads it has change nothing; of the file the content counts
     same = replace(
         config, output=stored.output, hyperparameters=None, num_threads=stored.num_threads
     )
-    if stored != same:
+    given = load_hyperparameters(config.hyperparameters, config.algo, config.env_id)
+    if stored != same or run.hyperparameters != json.loads(json.dumps(given)):
         raise RunFolderError(
             "run",
             str(folder.path),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from defmanip_gym.errors import ParameterError
+from defmanip_gym.errors import ParameterError, StateError
 from defmanip_gym.validation import require_whole
 from defmanip_gym.wrappers.actions import finite_actions
 
@@ -104,6 +104,21 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
         self._ended = ended
         return observation, reward, terminated, truncated, info
 
+    def require_memory(self, memory: Mapping[str, Any]) -> None:
+        """Raise StateError if this wrapper cannot be late as a memory says.
+
+        Filters have been told by how much it is, and whether by the same in all episodes.
+        """
+        delays, under_way = (np.asarray(memory[name]) for name in ("_delays", "_under_way"))
+        fits = delays.shape == (self.num_envs,) and under_way.shape == self._under_way.shape
+        if not fits or (delays < self._fewest).any() or (delays > self.periods).any():
+            raise StateError(
+                "delays of the state",
+                delays.tolist(),
+                f"{self._fewest} to {self.periods} periods in each of {self.num_envs} episodes",
+                "Take it from get_state of an environment with the same ActionDelay.",
+            )
+
     def _begin(self, started: BoolArray) -> None:
         self._under_way[:, started] = 0.0
         if self.is_drawn:
@@ -115,7 +130,8 @@ class ActionDelay(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
 
 def _required(periods: object) -> tuple[int, int]:
     """Return the fewest and the most periods."""
-    ends = periods if isinstance(periods, Sequence | np.ndarray) else (periods, periods)
+    several = isinstance(periods, Sequence) or np.ndim(periods) > 0  # type: ignore[arg-type]
+    ends: Any = periods if several else (periods, periods)
     if isinstance(ends, str) or len(ends) != 2:
         raise ParameterError("periods", periods, "a whole number, or two", "Give (fewest, most).")
     fewest = require_whole("periods", ends[0], 0, _MOST_PERIODS)

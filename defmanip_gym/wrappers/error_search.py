@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import GRAVITY_M_S2, BeamParams, BeamRanges
+from defmanip_gym.params import GRAVITY_M_S2, BeamRanges
 from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
@@ -73,16 +74,19 @@ def require_affordable(config: TransportConfig) -> None:
         )
 
 
-def at_its_worst(config: TransportConfig, beam: BeamParams) -> TransportConfig:
-    """Return an environment that carries one of its beams and is disturbed the most."""
-    return replace(
-        config,
-        beam=beam,
-        nominal_beam=config.believed_beam,
-        beam_ranges=BeamRanges(),
-        disturbance=config.largest_disturbance,
-        disturbance_ranges=DisturbanceRanges(),
-    )
+def worst_cases(config: TransportConfig) -> Iterator[TransportConfig]:
+    """Yield an environment with each of its extreme beams, disturbed the most."""
+    beams = dict.fromkeys(config.beam_ranges.extremes(config.beam))
+    disturbances = config.disturbance_ranges.worst(config.disturbance, config.task.control_period_s)
+    for beam, disturbance in product(beams, disturbances):
+        yield replace(
+            config,
+            beam=beam,
+            nominal_beam=config.believed_beam,
+            beam_ranges=BeamRanges(),
+            disturbance=disturbance,
+            disturbance_ranges=DisturbanceRanges(),
+        )
 
 
 class ErrorSearch:

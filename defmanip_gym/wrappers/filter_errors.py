@@ -12,7 +12,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
-from defmanip_gym.wrappers.error_search import ErrorSearch, at_its_worst, require_affordable
+from defmanip_gym.wrappers.error_search import ErrorSearch, require_affordable, worst_cases
 from defmanip_gym.wrappers.filter_motions import moving_states, resting_states
 
 Array = NDArray[np.float64]
@@ -51,8 +51,7 @@ def filter_errors(config: TransportConfig, safety_filter: StorageFilter) -> Filt
     """
     require_affordable(config)
     errors = np.zeros(_FOUND)
-    for beam in dict.fromkeys(config.beam_ranges.extremes(config.beam)):
-        carried = at_its_worst(config, beam)
+    for carried in worst_cases(config):
         errors = np.maximum(errors, _errors(carried, safety_filter))
     found = (_MARGIN * errors).tolist()
     return FilterErrors(

@@ -13,7 +13,7 @@ from defmanip_gym.theory.certificates.certificate import Certificate
 from defmanip_gym.theory.certificates.error_budget import ErrorBudget
 from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
 from defmanip_gym.wrappers.admissible_motions import moving_motions, resting_motions
-from defmanip_gym.wrappers.error_search import ErrorSearch, at_its_worst, require_affordable
+from defmanip_gym.wrappers.error_search import ErrorSearch, require_affordable, worst_cases
 
 Array = NDArray[np.float64]
 
@@ -49,10 +49,7 @@ def realization_errors(config: TransportConfig, certificate: Certificate) -> Rea
         CertificateError: the search would take too long.
     """
     require_affordable(config)
-    each = []
-    for beam in dict.fromkeys(config.beam_ranges.extremes(config.beam)):
-        carried = at_its_worst(config, beam)
-        each.append(_errors(carried, certificate))
+    each = [_errors(carried, certificate) for carried in worst_cases(config)]
     return RealizationErrors(
         room_m_s2=max(errors.room_m_s2 for errors in each),
         stray_m_s=max(errors.stray_m_s for errors in each),

@@ -9,13 +9,14 @@ from safetensors.numpy import load_file, save_file
 from small_agents import CARD, small_agent
 
 from defmanip_gym.baselines.analytic.tanner import GENTLE_PARAMS, TannerController
-from defmanip_gym.baselines.learned.agents import load_agent, load_family
+from defmanip_gym.baselines.learned.agents import load_agent, load_controller, load_family
 from defmanip_gym.baselines.learned.card import Normalization, SuiteScore
 from defmanip_gym.baselines.learned.deployment import controller_of
 from defmanip_gym.baselines.learned.families import shipped_families, write_card
 from defmanip_gym.errors import AgentFileError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 SCORE = SuiteScore(
     success_rate=0.75, violation_rate=0.25, score_iqm=0.5, median_time_s=9.0, episodes=8
@@ -116,6 +117,8 @@ def test_families_without_members_or_with_strangers_are_refused(library):
         {"certificate": "none"},
         {"safety_filter": "nu_max"},
         {"safety_filter": "storage", "certificate": "l1"},
+        {"filter_specification": {"name": "storage"}},
+        {"safety_filter": "backup", "filter_specification": {"name": "storage"}},
         {"residual_authority_m_s2": 1.0},
         {"residual_authority_m_s2": float("nan"), "certificate": "l1"},
         {"normalization": {"clip": 0}},
@@ -220,3 +223,39 @@ def test_a_residual_agent_corrects_the_papers_controller():
     assert controller_of(small_agent()).predict(observation)[0] == pytest.approx(
         small_agent().predict(observation)[0]
     )
+
+
+FILTER = StorageFilter().specification
+CORRECTS = {"safety_filter": "storage", "residual_authority_m_s2": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"safety_filter": "storage"}, "filter_specification"),
+        (
+            {
+                "safety_filter": "storage",
+                "filter_specification": FILTER | {"conditions": {"forward_error_m_s2": 1e3}},
+            },
+            "V_σ",
+        ),
+        (
+            {
+                "safety_filter": "storage",
+                "filter_specification": StorageFilter(BeamParams(segment_count=3)).specification,
+            },
+            "22 observations",
+        ),
+        (CORRECTS | {"residual_base": "nobody"}, "residual_base"),
+        (CORRECTS | {"hyperparameters": {"env_kwargs": {"beam": 3}}}, "env_kwargs"),
+        (CORRECTS | {"residual_authority_m_s2": 4.0}, "authority"),
+        (CORRECTS | {"residual_decision_periods": 5000}, "decision_periods"),
+        ({"certificate": "l1", "residual_authority_m_s2": 1.0, "residual_base": "lqr"}, "tanner"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_agents_that_cannot_run_as_they_were_trained_are_refused(changes, said, stem):
+    small_agent(**changes).save(stem)
+    with pytest.raises(AgentFileError, match=said):
+        load_controller(stem.with_name("agent.json"))

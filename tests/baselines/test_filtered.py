@@ -2,9 +2,11 @@
 
 import gymnasium
 import numpy as np
+import pytest
 
 from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.baselines.filtered import FilteredController
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.wrappers.filter_for import filter_for
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
@@ -77,3 +79,16 @@ def test_the_controllers_own_state_goes_on_below():
     observation[:, 10:12] = np.pi / 2, -np.pi / 2
     _, state = controller.predict(observation)
     assert state is not None and len(state) == 2
+
+
+@pytest.mark.parametrize("starts", [np.array([True]), np.array([1, 0, 1]), [True, False, True]])
+def test_starts_are_one_for_all_or_one_for_each(starts):
+    env = batch()
+    observation, _ = env.reset(seed=4)
+    env.close()
+    controller = FilteredController(Pushing(), StorageFilter())
+    first, state = controller.predict(observation)
+    again, _ = controller.predict(observation, state, starts)
+    np.testing.assert_array_equal(again[0], first[0])
+    with pytest.raises(ParameterError, match="episode_start"):
+        controller.predict(observation, state, np.array([True, False]))

@@ -13,6 +13,7 @@ pytest.importorskip("h5py")
 
 import h5py
 import minari
+from small_agents import small_agent
 
 from defmanip_gym.datasets import collection, command
 from defmanip_gym.datasets.config import DatasetConfig
@@ -20,6 +21,7 @@ from defmanip_gym.datasets.minari_access import open_dataset
 from defmanip_gym.datasets.reference_scores import ReferenceScores
 from defmanip_gym.errors import DatasetError
 from defmanip_gym.evaluation.seeds import dataset_seed
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 NAME = "deform-transport/mixed-v0"
 ALONE = """
@@ -212,3 +214,19 @@ def test_an_interruption_leaves_what_was_there(copied, tmp_path, quick, monkeypa
         command.run_dataset(settings(root, contestants=("zero",), shares=None, overwrite=overwrite))
     assert end.value.code == 130
     assert sorted(path.name for path in root.rglob("*")) == before
+
+
+def test_an_agent_controls_inside_the_filter_that_it_learned_in(tmp_path, quick):
+    specification = StorageFilter().specification
+    small_agent(safety_filter="storage", filter_specification=specification).save(
+        tmp_path / "run" / "agent"
+    )
+    small_agent(seed=1).save(tmp_path / "free" / "agent")
+    agents = (tmp_path / "run", tmp_path / "free")
+    made = settings(tmp_path, contestants=(), agents=agents, shares=None, episodes=2)
+    command.run_dataset(made)
+    inside, alone = open_dataset(NAME, tmp_path)
+    assert (inside.infos["wished_action"][1:] != inside.actions).any()
+    assert not inside.infos["cost"].any()
+    assert "wished_action" not in alone.infos
+    check(tmp_path)

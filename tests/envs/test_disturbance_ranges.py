@@ -1,13 +1,21 @@
 """Episodes may each draw what disturbs them."""
 
+import math
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
 
+from defmanip_gym.baselines.controller import ZeroController
 from defmanip_gym.disturbance_ranges import DisturbanceRanges
+from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.registration import ENV_ID
-from defmanip_gym.errors import ParameterError
-from defmanip_gym.params import DisturbanceParams
+from defmanip_gym.errors import CertificateError, ParameterError
+from defmanip_gym.evaluation.rollout import courses
+from defmanip_gym.params import BeamParams, DisturbanceParams
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.wrappers.filter_errors import filter_errors
 from defmanip_gym.wrappers.filter_for import filter_for
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
 
@@ -111,9 +119,49 @@ def test_filters_provide_for_the_largest():
         {"force_bias_n": (1.0, -1.0)},
         {"swing_sensor_noise_rad": (-0.1, 0.1)},
         {"force_amplitude_n": 3.0},
+        {"force_sensor_noise_n": (0.0, 1e7)},
         {"force_sensor_noise_n": (0.0, float("nan"))},
     ],
 )
 def test_ranges_that_are_none_are_refused(wrong):
     with pytest.raises(ParameterError):
         DisturbanceRanges(**wrong)
+
+
+def test_filters_provide_for_frequencies_that_samples_would_not_show():
+    unseen = math.tau / TransportConfig().task.control_period_s  # zero at all of them
+    (worst,) = DisturbanceRanges(force_frequency_rad_s=(0.0, unseen)).worst(
+        DisturbanceParams(force_amplitude_n=30.0), TransportConfig().task.control_period_s
+    )
+    assert worst.force_frequency_rad_s == pytest.approx(0.5 * unseen, rel=1e-2)
+    assert worst.force_frequency_rad_s != pytest.approx(0.5 * unseen, rel=1e-6)
+    config = TransportConfig(
+        disturbance=DisturbanceParams(force_amplitude_n=30.0),
+        disturbance_ranges=DisturbanceRanges(force_frequency_rad_s=(0.0, unseen)),
+    )
+    with pytest.raises(CertificateError):
+        filter_for(config)
+
+
+def test_filters_provide_for_a_bias_of_either_sign():
+    heavier = replace(BeamParams(), mass_kg=1.1 * BeamParams().mass_kg)  # is what robots believe
+
+    def errors(**arguments):
+        return filter_errors(TransportConfig(nominal_beam=heavier, **arguments), StorageFilter())
+
+    one_way, other_way = (
+        errors(disturbance=DisturbanceParams(force_bias_n=bias)) for bias in (-2.0, 1.9)
+    )
+    both = errors(disturbance_ranges=DisturbanceRanges(force_bias_n=(-2.0, 1.9)))
+    assert both.offset_m_s2 == tuple(
+        map(max, zip(one_way.offset_m_s2, other_way.offset_m_s2, strict=True))
+    )
+    assert one_way.offset_m_s2 != both.offset_m_s2 != other_way.offset_m_s2
+
+
+def test_rollouts_draw_them():
+    config = TransportConfig(disturbance_ranges=DisturbanceRanges(force_bias_n=(20.0, 20.0)))
+    pushed, left = (
+        courses(ZeroController(), [1], config=each, steps=2) for each in (config, TransportConfig())
+    )
+    assert not np.array_equal(pushed[0].observation, left[0].observation)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from small_agents import small_agent
 
 from defmanip_gym.baselines.controller import RandomController
 from defmanip_gym.baselines.learned.actor import MlpActor
@@ -15,7 +16,7 @@ from defmanip_gym.baselines.learned.agents import load_agent, load_family, shipp
 from defmanip_gym.baselines.registry import available_controllers, registered_controllers
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import AgentFileError, ParameterError
-from defmanip_gym.evaluation import protection
+from defmanip_gym.evaluation import learned_contestants, protection
 from defmanip_gym.evaluation.contestants import (
     known_names,
     standard_contestants,
@@ -26,6 +27,7 @@ from defmanip_gym.evaluation.learned_contestants import agent_contestants
 from defmanip_gym.evaluation.options import FILTER_OPTION
 from defmanip_gym.evaluation.protection import Certificates
 from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.theory.filters.storage_filter import StorageFilter
 
 SIZE = ObservationLayout(1).size
 
@@ -156,3 +158,13 @@ def test_an_agent_for_other_observations_is_refused(tmp_path):
     agent(size=SIZE + 2).save(tmp_path / "agent")
     with pytest.raises(AgentFileError, match=rf"{SIZE + 2}.*{SIZE}"):
         agent_contestants(tmp_path, Certificates())
+
+
+def test_what_an_agent_corrects_inside_a_filter_is_the_same_inside_a_certificate(monkeypatch):
+    specification = StorageFilter().specification
+    card = {"safety_filter": "storage", "filter_specification": specification}
+    corrects = small_agent(**card, residual_authority_m_s2=1.0, residual_base="oriented")
+    monkeypatch.setattr(learned_contestants, "load_family", lambda name: (corrects,))
+    for name in ("mine", "mine/storage", "mine/l1"):
+        (member,) = learned_contestants.family_contestant(name, Certificates(), None).members
+        assert member.controller.identity["base"]["controller"] == "oriented"

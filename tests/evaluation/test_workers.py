@@ -67,6 +67,13 @@ def relatives(group):
     return found
 
 
+def wait_until_alone(process):
+    patience = time.monotonic() + 30.0  # they are being ended, not necessarily gone
+    while relatives(process.pid):
+        assert time.monotonic() < patience, relatives(process.pid)
+        time.sleep(0.05)
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_path, monkeypatch):
     here, there = tmp_path / "here", tmp_path / "parallel"
@@ -85,10 +92,7 @@ def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_p
     output, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Go on by running" in " ".join(output.split()) and errors == ""
-    patience = time.monotonic() + 30.0  # they are being ended, not necessarily gone
-    while relatives(process.pid):
-        assert time.monotonic() < patience, relatives(process.pid)
-        time.sleep(0.05)
+    wait_until_alone(process)
     kept = files(there)
 
     process = start(there, 2)
@@ -96,6 +100,12 @@ def test_stopped_in_two_ways_a_comparison_still_ends_with_the_same_records(tmp_p
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate(timeout=60)
     assert files(there).items() >= kept.items()
+
+    process = start(there, 2)
+    wait_for_a_file(there, process)
+    process.kill()  # it alone
+    process.communicate(timeout=60)
+    wait_until_alone(process)
 
     process = start(there, 2)
     _, errors = process.communicate(timeout=300)

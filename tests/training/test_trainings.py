@@ -88,6 +88,21 @@ def test_a_run_with_other_settings_is_not_gone_on_with(config):
         train_or_go_on(other)
 
 
+def test_a_run_with_other_hyperparameters_is_not_gone_on_with(config):
+    (run,) = config(seeds=(0,)).runs
+    train_or_go_on(run)
+    text = run.hyperparameters.read_text()
+    run.hyperparameters.write_text(text.replace("n_steps: 32", "n_steps: 64"))
+    with pytest.raises(RunFolderError, match="--output"):
+        train_or_go_on(run)
+
+
+def test_an_output_that_cannot_be_written_is_told(config, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunFolderError, match="writable"):
+        run_trainings(config(output=tmp_path / "file"))
+
+
 def test_what_a_killed_worker_had_begun_another_goes_on_with(config):
     distributed = pytest.importorskip("distributed")
     settings = config(total_timesteps=6 * STEPS, jobs=None)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 
-from defmanip_gym.errors import ActionError, ParameterError
+from defmanip_gym.envs.state import get_state, set_state
+from defmanip_gym.errors import ActionError, ParameterError, StateError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
 from defmanip_gym.wrappers.action_delay import ActionDelay
@@ -106,7 +107,7 @@ def test_bad_actions_are_refused_at_once():
             env.step(actions)
 
 
-@pytest.mark.parametrize("periods", [-1, 1.5, None])
+@pytest.mark.parametrize("periods", [-1, 1.5, None, np.array(1.5), "ab", (1, 2, 3)])
 def test_impossible_delays_are_refused(periods):
     with pytest.raises(ParameterError, match="periods"):
         delayed(periods)
@@ -135,3 +136,16 @@ def test_drawn_delays_are_the_seeds_and_filters_do_not_cover_them():
     assert not info["filter_applies"].any() and "ActionDelay" in info["filter_reason"][0]
     with pytest.raises(ParameterError, match="periods"):
         ActionDelay(few, (3, 1))
+
+
+def test_states_of_wrappers_that_are_late_otherwise_are_refused():
+    drawn, fixed, later = (delayed(periods, count=8)[0] for periods in ((0, 3), 3, 4))
+    for env in (drawn, fixed, later):
+        env.reset(seed=0)
+    for given, taken in ((drawn, fixed), (later, fixed), (fixed, later)):
+        before = taken.delays
+        with pytest.raises(StateError, match="delays"):
+            set_state(taken, get_state(given))
+        np.testing.assert_array_equal(taken.delays, before)
+    set_state(drawn, get_state(fixed))  # it may be as late in all
+    np.testing.assert_array_equal(drawn.delays, 3)

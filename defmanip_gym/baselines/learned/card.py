@@ -168,6 +168,11 @@ class AgentCard:
         _require_instance("normalization", self.normalization, Normalization)
         for suite, score in self.scores.items():
             _require_instance(f"scores of {suite}", score, SuiteScore)
+        if self.filter_specification is not None:
+            told = self.filter_specification.get("name")
+            fits = self.safety_filter is not None and told == self.safety_filter
+            allowed = f"null, or that of safety_filter={self.safety_filter!r}"
+            _require("filter_specification", self.filter_specification, fits, allowed)
         self._check_residual()
 
     def _check_residual(self) -> None:

@@ -12,14 +12,16 @@ from defmanip_gym.baselines.filtered import FilteredController
 from defmanip_gym.baselines.learned.actor import MlpActor
 from defmanip_gym.baselines.learned.card import AgentCard
 from defmanip_gym.baselines.residual import ResidualController
-from defmanip_gym.baselines.residual_base import corrected_controller
+from defmanip_gym.baselines.residual_base import PAPERS, corrected_controller
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.registration import environment_arguments
-from defmanip_gym.errors import AgentFileError, ParameterError
+from defmanip_gym.errors import AgentFileError, InvalidValueError, ParameterError
+from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 from defmanip_gym.theory.filters.family import require_filter
+from defmanip_gym.theory.filters.safety_filter import SafetyFilter
 
 _CONFIGURED = frozenset(field.name for field in fields(TransportConfig))
 
@@ -36,7 +38,7 @@ def training_config(card: AgentCard) -> TransportConfig:
     arguments = environment_arguments(card.env_id) | dict(changes)
     try:
         return TransportConfig(**{name: arguments[name] for name in _CONFIGURED & set(arguments)})
-    except (ParameterError, TypeError) as error:
+    except (InvalidValueError, TypeError) as error:
         raise _foreign(changes) from error
 
 
@@ -52,34 +54,58 @@ def controller_of(actor: MlpActor, *, certificate: Certificate | None = None) ->
             the training, computed anew for the reference beam.
 
     Raises:
-        AgentFileError: a card whose environment or base there is not.
+        AgentFileError: a card whose environment or base there is not, or whose corrections are
+            larger or held longer than any.
     """
     card = actor.card
     if card.residual_authority_m_s2 is None:
         return actor
-    return ResidualController(
-        _below(card, certificate),
-        actor,
-        authority=card.residual_authority_m_s2 / TaskParams().max_acceleration_m_s2,
-        decision_periods=card.residual_decision_periods,
-    )
+    below = _below(card, certificate)
+    try:
+        return ResidualController(
+            below,
+            actor,
+            authority=card.residual_authority_m_s2 / TaskParams().max_acceleration_m_s2,
+            decision_periods=card.residual_decision_periods,
+        )
+    except ParameterError as error:
+        raise AgentFileError(
+            "residual",
+            (card.residual_authority_m_s2, card.residual_decision_periods),
+            "corrections as trainings make them",
+            f"{error}",
+        ) from error
 
 
 def deployed(actor: MlpActor) -> Controller:
     """Return the controller that an agent stands for, inside the filter that it learned in.
 
     Raises:
-        AgentFileError: a card whose environment, base or filter there is not.
+        AgentFileError: a card whose environment, base or filter there is not, or that does not
+            tell all of its filter.
     """
-    controller, specification = controller_of(actor), actor.card.filter_specification
+    controller, safety_filter = controller_of(actor), filter_of(actor.card)
+    return controller if safety_filter is None else FilteredController(controller, safety_filter)
+
+
+def filter_of(card: AgentCard) -> SafetyFilter | None:
+    """Return the safety filter that an agent learned in, None if it did in none.
+
+    Raises:
+        AgentFileError: there is no such filter, or not for its observations.
+    """
+    specification = card.filter_specification
     if specification is None:
-        return controller
+        if card.safety_filter is None:
+            return None
+        raise _no_filter(specification, "The card is an old one: train the agent again.")
     try:
-        return FilteredController(controller, require_filter("filter", specification))
-    except ParameterError as error:
-        raise AgentFileError(
-            "filter_specification", specification, "a filter's specification", f"{error}"
-        ) from error
+        made = require_filter("filter", specification)
+    except InvalidValueError as error:
+        raise _no_filter(specification, f"{error}") from error
+    if ObservationLayout(made.segment_count).size != card.observation_size:
+        raise _no_filter(specification, f"The agent has {card.observation_size} observations.")
+    return made
 
 
 def corrected_by(actor: MlpActor) -> Controller | None:
@@ -92,17 +118,28 @@ def corrected_by(actor: MlpActor) -> Controller | None:
 
 def _below(card: AgentCard, certificate: Certificate | None) -> Controller:
     if card.certificate is None:
+        config = training_config(card)
         try:
-            return corrected_controller(card.residual_base, training_config(card))
-        except ParameterError as error:
+            return corrected_controller(card.residual_base, config)
+        except InvalidValueError as error:
             raise AgentFileError(
                 "residual_base", card.residual_base, "a registered controller", f"{error}"
             ) from error
+    if card.residual_base != PAPERS:
+        raise AgentFileError(
+            "residual_base", card.residual_base, repr(PAPERS), "Others are inside a filter."
+        )
     if certificate is None:
         certificate = certify(
             BeamParams(), method=card.certificate, conditions=TRANSPORT_CONDITIONS
         )
     return TannerController(certificate=certificate, params=GENTLE_PARAMS)
+
+
+def _no_filter(specification: object, remedy: str) -> AgentFileError:
+    return AgentFileError(
+        "filter_specification", specification, "a filter's, for the agent's beam", remedy
+    )
 
 
 def _foreign(changes: object) -> AgentFileError:
