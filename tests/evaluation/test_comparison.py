@@ -9,7 +9,7 @@ import pytest
 from filelock import FileLock
 
 from defmanip_gym.errors import ParameterError, RecordError
-from defmanip_gym.evaluation import comparison, jobs, suites, workers
+from defmanip_gym.evaluation import comparison, jobs, suites
 from defmanip_gym.evaluation.comparison import ComparisonConfig, run_comparison
 from defmanip_gym.evaluation.timings import read_timings
 from defmanip_gym.evaluation.traces import load_trace
@@ -69,7 +69,7 @@ def started(monkeypatch):
         names.extend((entry.suite, entry.contestant, s.name) for s in job.suite.scenarios)
         return jobs.run_job(job)
 
-    monkeypatch.setattr(workers, "run_job", counting)
+    monkeypatch.setattr(comparison, "run_job", counting)
     return names
 
 
@@ -109,7 +109,7 @@ def test_an_interrupted_comparison_goes_on_without_repeating(
         return jobs.run_job(job)
 
     with monkeypatch.context() as patch:
-        patch.setattr(workers, "run_job", interrupted)
+        patch.setattr(comparison, "run_job", interrupted)
         with pytest.raises(SystemExit) as stop:
             run_comparison(config(tmp_path))
     assert stop.value.code == 130
