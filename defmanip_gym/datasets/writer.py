@@ -79,6 +79,7 @@ def new_dataset(
     minari = require_minari()
     root = root.absolute()
     target = root / name
+    _require_outside(target, root)
     if target.exists() and not (overwrite and is_dataset(target)):
         allowed = "an id that is free, or --overwrite" if is_dataset(target) else "a free id"
         raise DatasetError("dataset", str(target), allowed, "Choose another, or another --output.")
@@ -100,7 +101,7 @@ def new_dataset(
             )
         yield DatasetWriter(dataset, root)
         with _writable(root), minari_in(root):
-            _publish(stage / name, target, stage)
+            _publish(stage / name, target, stage, overwrite=overwrite)
             _name_namespace(name)
     finally:
         shutil.rmtree(stage, ignore_errors=True)
@@ -133,12 +134,25 @@ def _buffer(number: int, seed: int, course: Course) -> Any:
     )
 
 
-def _publish(made: Path, target: Path, stage: Path) -> None:
-    """Put a finished dataset in its place; whatever interrupts this leaves the old or the new."""
+def _require_outside(target: Path, root: Path) -> None:
+    """Raise DatasetError within another dataset, which takes all with it when it is replaced."""
+    above = target.relative_to(root).parents
+    for folder in (root / each for each in above):
+        if is_dataset(folder):
+            raise DatasetError(
+                "dataset", str(target), f"an id outside of the dataset {folder}", "Choose another."
+            )
+
+
+def _publish(made: Path, target: Path, stage: Path, *, overwrite: bool) -> None:
+    """Put a finished dataset in its place; whatever interrupts this leaves the old or the new.
+
+    What somebody else has put there meanwhile stays unless it may be replaced.
+    """
     replaced = stage / "replaced"
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        if target.exists():
+        if overwrite and target.exists():
             os.rename(target, replaced)
         os.rename(made, target)
     finally:

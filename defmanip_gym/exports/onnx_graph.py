@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -122,6 +123,7 @@ def _properties(actor: MlpActor) -> dict[str, str]:
         "env_id": card.env_id,
         "package_version": card.package_version,
         "agent": f"{card.recipe}, seed {card.seed}, digest {actor.digest}",
+        "env_kwargs": json.dumps(card.hyperparameters.get("env_kwargs") or {}),
         "trained_inside": card.trained_inside or "nothing",
         "action": f"in [-1, 1]: acceleration of the grasp, forward, left, up, over {limit:g} m/s²",
     }

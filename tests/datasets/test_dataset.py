@@ -230,3 +230,20 @@ def test_an_agent_controls_inside_the_filter_that_it_learned_in(tmp_path, quick)
     assert not inside.infos["cost"].any()
     assert "wished_action" not in alone.infos
     check(tmp_path)
+
+
+def test_no_dataset_lies_within_another(written):
+    with pytest.raises(DatasetError, match="outside of the dataset"):
+        command.run_dataset(settings(written, name=f"{NAME}/inner-v0"))
+
+
+def test_what_somebody_else_wrote_meanwhile_stays(tmp_path, quick, monkeypatch):
+    def meanwhile(part, env):
+        (tmp_path / NAME / "data").mkdir(parents=True)
+        return iter(())
+
+    monkeypatch.setattr(command, "episodes_of", meanwhile)
+    with pytest.raises(DatasetError):
+        command.run_dataset(settings(tmp_path, contestants=("zero",), shares=None))
+    assert [path.name for path in tmp_path.iterdir()] == [NAME.partition("/")[0]]
+    assert (tmp_path / NAME / "data").is_dir()

@@ -1,5 +1,6 @@
 """Exported agents act as the agents do."""
 
+import json
 import subprocess
 import sys
 
@@ -37,6 +38,7 @@ def test_the_graph_gives_the_agents_actions(name):
     assert np.abs(actions - actor.predict(observations)[0]).max() < 1e-4
     told = session.get_modelmeta().custom_metadata_map
     assert actor.digest in told["agent"] and told["env_id"] == "DeformTransport-v0"
+    assert json.loads(told["env_kwargs"]) == (actor.card.hyperparameters.get("env_kwargs") or {})
 
 
 @pytest.mark.parametrize("changes", [{"activation": "relu"}, {"squashed": True}])
