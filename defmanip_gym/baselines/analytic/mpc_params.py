@@ -27,11 +27,11 @@ class MpcParams(WayLawParams):
 
     way: WayParams = field(
         default_factory=lambda: WayParams(
-            turn_radius_m=3.76,
-            yaw_rate_rad_s=2.36,
-            deceleration_m_s2=3.22,
-            vertical_deceleration_m_s2=2.56,
-            approach_rate_per_s=8.68,
+            turn_radius_m=3.75,
+            yaw_rate_rad_s=2.18,
+            deceleration_m_s2=4.48,
+            vertical_deceleration_m_s2=1.15,
+            approach_rate_per_s=4.69,
         )
     )
     blocks: tuple[int, ...] = HORIZON_BLOCKS

@@ -24,14 +24,14 @@ class HorizonWeights:
         terminal_s: how much longer than its block the last point counts.
     """
 
-    position: float = 26.4
-    velocity: float = 0.195
-    swing: float = 0.0093
-    swing_rate: float = 0.0242
+    position: float = 22.3
+    velocity: float = 1.17
+    swing: float = 0.006
+    swing_rate: float = 0.078
     acceleration: float = 0.02
-    heading: float = 0.59
+    heading: float = 1.57
     heading_radius_m: float = 0.5
-    terminal_s: float = 0.906
+    terminal_s: float = 1.96
 
     def __post_init__(self) -> None:
         for name in ("position", "acceleration", "heading_radius_m"):
