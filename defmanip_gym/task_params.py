@@ -33,6 +33,8 @@ class RewardParams:
     closeness_weight: float = 5.0
     approach_speed_per_m: float = 1.0
     approach_swing_rad_per_m: float = 0.5
+    time_to_go_weight_per_s: float = 0.0
+    swing_cost_s_per_rad: float = 0.3
     time_cost_per_step: float = 0.02
     effort_weight: float = 0.001
     success_bonus: float = 10.0

@@ -63,9 +63,9 @@ def make_plant():
 def make_batch():
     """Return a factory of batched environments that neither end nor reset by themselves."""
 
-    def make(num_envs=1, **kwargs):
+    def make(num_envs=1, env_id="DeformTransport-v0", **kwargs):
         return gymnasium.make_vec(
-            "defmanip_gym:DeformTransport-v0",
+            f"defmanip_gym:{env_id}",
             num_envs=num_envs,
             vectorization_mode="vector_entry_point",
             **{

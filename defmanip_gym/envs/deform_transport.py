@@ -79,7 +79,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | 19-21 | near_offset_b    | tanh of goal_offset_b over 0.5 m       | -          |
 
     ## Rewards
-    The sum of the terms below, each also in `info`; the first three are differences of potentials.
+    The sum of the terms below, each also in `info`; the first four are differences of potentials.
     d is the planar plus the vertical distance of the grasp to the goal, ψ the angle between the
     heading and the dipole streamline (Section VI) through the grasp, blended into the heading
     error at the goal, and e the Euclidean norm of the success errors, each over its tolerance.
@@ -91,12 +91,17 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | reward_distance    | decrease of d, 1 per metre                                             |
     | reward_course      | decrease of ψ, 10 per radian                                           |
     | reward_closeness   | decrease of log(1 + e), times 5                                        |
+    | reward_time_to_go  | decrease of T̂, times 0 in v0                                           |
     | reward_time        | -0.02 a step                                                           |
     | reward_effort      | -0.001 times the squared norm of the action                            |
     | reward_success     | +10 on success                                                         |
     | reward_failure     | -10 on leaving the workspace, on failed physics, and in                |
     |                    | `constraint_mode="terminate"` on exceeding σ                           |
     | reward_deformation | in `constraint_mode="penalty"`: -(‖z2‖∞/σ - 1) while σ is exceeded     |
+
+    In v1 the first three weights and the time's are 0, reward_time_to_go is 10 times the decrease
+    of T̂ in s, and failure costs 20. T̂ is how long it takes to come to rest at the goal, estimated
+    from position, heading, their rates and the swing (docs/derivations.md, section 25).
 
     Every step's `info` also holds `is_success` and, in every mode, `cost` (1.0 while ‖z2‖∞ > σ,
     else 0.0), `episode_cost` (its sum over the steps of the episode so far), `constraint_margin`
@@ -142,6 +147,10 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     Parameters may also be mappings of their fields, as the JSON of `env.spec` holds them.
 
     ## Version History
+    * v1: the inner loop `"measured_force"`, and the time to the goal as reward, by which quicker
+      is better at once: arguments `inner_loop` and `task.reward`. Another `task` brings v0's
+      reward back, unless it has its own. `DeformTransportRandomized-v1` also draws beams (damping
+      ×0.1 to ×10, mass ×0.5 to ×2, length ±20 %), disturbances and starts 0.5 to 18 m away.
     * v0: initial version.
     """
 

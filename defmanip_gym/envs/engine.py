@@ -102,6 +102,10 @@ class TransportEngine:
         """Control periods since the start of each episode, (n,)."""
         return self._steps
 
+    def count_from(self, steps: NDArray[np.int64]) -> None:
+        """Take the running episodes for ones with (n,) control periods behind them."""
+        self._steps[:] = np.maximum(steps, self._steps)
+
     @property
     def plant_state(self) -> PlantState:
         """The true state, for evaluation and drawing; controllers see observations only.

@@ -50,7 +50,7 @@ class Scores(NamedTuple):
     Attributes:
         observations: (n, size), without sensor noise until that is added.
         flags: ``FLAGS``, then whether it terminated and whether it was truncated, (5, n).
-        numbers: ``MEASURES``, then reward, potentials and the episode's cost, (17, n).
+        numbers: ``MEASURES``, then reward, potentials and the episode's cost, (19, n).
     """
 
     observations: Array
@@ -77,7 +77,7 @@ class Scores(NamedTuple):
 
     @property
     def measures(self) -> Array:
-        """``MEASURES``, (12, n)."""
+        """``MEASURES``, (13, n)."""
         return self.numbers[:_REWARD]
 
     @property
@@ -148,7 +148,7 @@ def score(
             simulation_failed=failed[i],
         )
         margin, now = constraint_margin(state, task), potentials(state, task)
-        costs, terms = 0.0, RewardTerms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        costs, terms = 0.0, RewardTerms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if not begins:
             squared_action = 0.0
             for k in range(size):
@@ -157,6 +157,7 @@ def score(
                 before.numbers[_POTENTIALS, i],
                 before.numbers[_POTENTIALS + 1, i],
                 before.numbers[_POTENTIALS + 2, i],
+                before.numbers[_POTENTIALS + 3, i],
             )
             costs = before.numbers[_EPISODE_COST, i]
             terms = reward_terms(last, now, squared_action, outcome, margin, task)

@@ -13,8 +13,9 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.task import TaskState
 from defmanip_gym.observation import NEAR_OFFSET_SCALE_M, ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
+from defmanip_gym.theory.control.time_to_go import Motion
 from defmanip_gym.theory.control.velocity_field import streamline_heading
-from defmanip_gym.theory.dynamics.frames import turned
+from defmanip_gym.theory.dynamics.frames import turned, wrapped
 from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity, reach_and_height
 
 Array = NDArray[np.float64]
@@ -42,12 +43,6 @@ def goal_of(config: TransportConfig) -> Goal:
         course_blend_radius_m=float(config.task.course_blend_radius_m),
         arm=ArmLengths.of(config.robot),
     )
-
-
-@compilable
-def wrapped(angle: float) -> float:
-    """Return the angle in (−π, π]."""
-    return angle - 2 * math.pi * math.ceil((angle - math.pi) / (2 * math.pi))
 
 
 @compilable
@@ -98,7 +93,7 @@ def survey(goal: Goal, plant: PlantState, i: int, observations: Array) -> TaskSt
     observations[i, 3], observations[i, 4] = math.sin(heading_error), math.cos(heading_error)
     observations[i, 5], observations[i, 6], observations[i, 7] = forward, left, up
     observations[i, 8], observations[i, 9] = u1, u2
-    largest_swing = 0.0
+    largest_swing, largest_rate = 0.0, 0.0
     _, segments = plant.swing.shape
     for k in range(2):
         observations[i, 10 + k] = plant.joints[i, k]
@@ -107,6 +102,7 @@ def survey(goal: Goal, plant: PlantState, i: int, observations: Array) -> TaskSt
         observations[i, 14 + k] = plant.swing[i, k]
         observations[i, 14 + segments + k] = plant.swing_rate[i, k]
         largest_swing = max(largest_swing, abs(plant.swing[i, k]))
+        largest_rate = max(largest_rate, abs(plant.swing_rate[i, k]))
     for k in range(3):
         observations[i, 14 + 2 * segments + k] = plant.grasp_force_b[i, k]
         observations[i, 17 + 2 * segments + k] = math.tanh(observations[i, k] / NEAR_OFFSET_SCALE_M)
@@ -118,6 +114,8 @@ def survey(goal: Goal, plant: PlantState, i: int, observations: Array) -> TaskSt
         heading_error_rad=heading_error,
         course_error_rad=course_error(x, y, heading_error, goal.course_blend_radius_m),
         largest_swing_rad=largest_swing,
+        largest_swing_rate_rad_s=largest_rate,
+        motion=Motion(x, y, -above, heading_error, forward, up, u2),
     )
 
 

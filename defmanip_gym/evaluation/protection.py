@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import Any, Protocol
 
 from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
+from defmanip_gym.envs.registration import ROBUST_FACTORS
 from defmanip_gym.evaluation.conditions import NOMINAL_BEAM, Condition
 from defmanip_gym.params import DESIGN_DAMPING, BeamRanges
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
@@ -22,7 +23,7 @@ from defmanip_gym.wrappers.nu_max_scaling import nu_max_filter
 # factors on the nominal beam that are provided for where a condition carries another
 MISMATCH_FACTORS = {"damping": (0.1, 10.0), "mass_kg": (0.8, 1.2), "length_m": (0.8, 1.2)}
 # and where the inner loop takes no weight for granted; on the other one errors would leave nothing
-MEASURED_FACTORS = MISMATCH_FACTORS | {"mass_kg": (0.5, 2.0)}
+MEASURED_FACTORS = ROBUST_FACTORS
 
 
 class Protection(Protocol):

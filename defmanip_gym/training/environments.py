@@ -18,7 +18,7 @@ from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.validation import require_whole
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper
-from defmanip_gym.wrappers.transport import delay_periods, transport_config
+from defmanip_gym.wrappers.transport import known_delay_periods, transport_config
 
 _EVALUATION_BATCH = 64
 
@@ -79,13 +79,15 @@ def _sb3_env(config: TrainConfig, hyperparameters: dict[str, Any], num_envs: int
         )
         env = NuMaxVectorActionScaling(env, certificate)
     if config.filter is not None:
-        made = shared_filter(transport_config(env), config.filter, delay_periods(env))
+        made = shared_filter(transport_config(env), config.filter, known_delay_periods(env))
         env = SafetyFilterVectorWrapper(env, made)
     return Sb3VecEnv(env)
 
 
 def _batched(wrapper: Any) -> Any:
     """Return the batched counterpart that a wrapper of single environments names."""
+    if isinstance(wrapper, type) and issubclass(wrapper, gymnasium.vector.VectorWrapper):
+        return wrapper
     counterpart = getattr(wrapper, "vector_wrapper", None)
     if counterpart is None:
         raise ParameterError(

@@ -14,11 +14,24 @@ from defmanip_gym.baselines.learned.families import (
     member_name,
     require_alike,
 )
-from defmanip_gym.envs.registration import RANDOMIZED_ENV_ID
+from defmanip_gym.envs.registration import (
+    ENV_ID,
+    QUICK_ENV_ID,
+    RANDOMIZED_ENV_ID,
+    ROBUST_ENV_ID,
+)
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.files import write_atomically
 from defmanip_gym.training.run_folder import LAST_AGENT, RunFolder
 from defmanip_gym.training.ship_config import ShipConfig
+
+# what a family's name says of the environment that it learned in
+_WHERE = {
+    ENV_ID: (),
+    RANDOMIZED_ENV_ID: ("randomized",),
+    QUICK_ENV_ID: ("v1",),
+    ROBUST_ENV_ID: ("randomized", "v1"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,9 +106,7 @@ def _finished(path: Path) -> _Finished:
             "a commit without changes",
             "Nobody could repeat this run: commit, and train again.",
         )
-    parts = [agent.card.recipe, stored.train.trained_inside]
-    if agent.card.env_id == RANDOMIZED_ENV_ID:
-        parts.append("randomized")
+    parts = [agent.card.recipe, stored.train.trained_inside, *_WHERE[agent.card.env_id]]
     return _Finished(path=path, agent=agent, family="-".join(filter(None, parts)))
 
 

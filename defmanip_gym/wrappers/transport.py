@@ -76,6 +76,15 @@ def delay_periods(env: Any) -> int:
     return sum(layer.periods for layer in wrappers(env) if isinstance(layer, ActionDelay))
 
 
+def known_delay_periods(env: Any) -> int:
+    """Return by how many control periods wrappers hold actions back in every episode.
+
+    That is what a filter can foresee through; of delays that episodes draw nothing is known to it.
+    """
+    delays = [layer for layer in wrappers(env) if isinstance(layer, ActionDelay)]
+    return sum(layer.periods for layer in delays if not layer.is_drawn)
+
+
 def _keeps_actions(layer: Any) -> bool:
     kind = type(layer)
     if hasattr(kind, "keeps_actions"):

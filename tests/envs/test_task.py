@@ -4,12 +4,14 @@ import math
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.task import TaskState, potentials, task_of
+from defmanip_gym.theory.control.time_to_go import Motion
 
 TASK = task_of(TransportConfig())
+AT_REST = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def closeness(*, distance_m, speed_m_s=0.0, swing_rad=0.0):
-    state = TaskState(distance_m, 0.0, speed_m_s, 0.0, 0.0, swing_rad)
+    state = TaskState(distance_m, 0.0, speed_m_s, 0.0, 0.0, swing_rad, 0.0, AT_REST)
     return potentials(state, TASK).closeness
 
 

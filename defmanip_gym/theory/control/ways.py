@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from defmanip_gym.theory.dynamics.chain import Array
+from defmanip_gym.compiled import Numbers, compilable
 
 _TINY = 1e-12
 
@@ -28,13 +28,14 @@ class Way(NamedTuple):
         radius_m: of the arc.
     """
 
-    course: Array
-    straight_m: Array
-    arc_rad: Array
-    radius_m: Array
+    course: Numbers
+    straight_m: Numbers
+    arc_rad: Numbers
+    radius_m: Numbers
 
 
-def way_to_goal(x: Array, y: Array, turn_radius_m: Array | float) -> Way:
+@compilable
+def way_to_goal(x: Numbers, y: Numbers, turn_radius_m: Numbers) -> Way:
     """Return the way from each point, over the circle on its own side of the x axis.
 
     Continuous but for the half line y = 0, x > 0, from which it leads away on both sides.
@@ -44,12 +45,15 @@ def way_to_goal(x: Array, y: Array, turn_radius_m: Array | float) -> Way:
         y: likewise.
         turn_radius_m: R, (...).
     """
-    side, y = np.where(y < 0, -1.0, 1.0), np.abs(y)
+    # choices as products: np.where takes arrays only
+    side, y = 1.0 - 2.0 * (y < 0), np.abs(y)
     square = x**2 + y**2
     power = square - 2 * turn_radius_m * y  # of the point with respect to the circle
-    radius = np.where(power < 0, square / np.maximum(2 * y, _TINY), turn_radius_m)
+    within = 1.0 * (power < 0)
+    radius = within * (square / np.maximum(2 * y, _TINY)) + (1.0 - within) * turn_radius_m
     straight = np.sqrt(np.maximum(power, 0.0))
     # towards the circle's centre, and from there to its tangent
     course = np.arctan2(radius - y, -x) - np.arctan2(radius, straight)
-    arc = np.where((course > 0) & (x > 0), 2 * np.pi - course, np.maximum(-course, 0.0))
+    around = 1.0 * ((course > 0) & (x > 0))
+    arc = around * (2 * np.pi - course) + (1.0 - around) * np.maximum(-course, 0.0)
     return Way(side * course, straight, arc, radius)

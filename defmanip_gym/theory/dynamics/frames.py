@@ -1,6 +1,8 @@
-"""Turning horizontal vectors between the world and the base frame."""
+"""Angles, and horizontal vectors turned between the world and the base frame."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -17,6 +19,12 @@ def base_to_world(vector_b: Array, heading: Array) -> Array:
     """Return a (..., 3) vector of the base frame in world coordinates."""
     x, y = turned(vector_b[..., 0], vector_b[..., 1], heading)
     return np.stack((x, y, vector_b[..., 2]), axis=-1)
+
+
+@compilable
+def wrapped(angle: float) -> float:
+    """Return the angle in (−π, π]."""
+    return angle - 2 * math.pi * math.ceil((angle - math.pi) / (2 * math.pi))
 
 
 @compilable
