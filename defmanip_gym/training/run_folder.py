@@ -6,10 +6,13 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from defmanip_gym.errors import RunFolderError
 from defmanip_gym.files import write_atomically
@@ -21,6 +24,7 @@ from defmanip_gym.version import __version__, git_revision
 LAST_AGENT = "last"  # beside RUN_AGENT, the best on the validation starts
 
 _CONFIG = "config.json"
+_LOCK = ".lock"
 _CHECKPOINTS = "checkpoints"
 _KEPT_CHECKPOINTS = 2
 
@@ -61,6 +65,27 @@ class RunFolder:
                 "output", str(config.output), "a writable folder", f"{error}"
             ) from error
         return folder
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep others from training or deleting the run.
+
+        Raises:
+            RunFolderError: somebody else does, or the folder cannot be written.
+        """
+        lock = FileLock(self.path / _LOCK)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout as error:
+            raise RunFolderError(
+                "run", str(self.path), "one that nobody trains", "Wait until it ends, or end it."
+            ) from error
+        except OSError as error:
+            raise RunFolderError("run", str(self.path), "a writable folder", f"{error}.") from error
+        try:
+            yield
+        finally:
+            lock.release()
 
     def _write_config(
         self, config: TrainConfig, hyperparameters: dict[str, Any], command: str

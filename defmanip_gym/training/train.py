@@ -87,7 +87,7 @@ def train(config: TrainConfig, *, shows_progress: bool = True) -> Path:
         export(folder, LAST_AGENT, config, model, venv)
 
     try:
-        with stop_on_ctrl_c() as stop, progress_bar(shows_progress) as bars:
+        with folder.held(), stop_on_ctrl_c() as stop, progress_bar(shows_progress) as bars:
             model.learn(
                 total - model.num_timesteps,
                 callback=CallbackList([*callbacks, Checkpoints(save, interval, stop), *bars]),

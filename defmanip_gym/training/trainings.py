@@ -65,7 +65,8 @@ def train_or_go_on(config: TrainConfig) -> Path:
         try:
             folder.last_checkpoint()
         except RunFolderError:  # it ended before its first one
-            shutil.rmtree(folder.path)
+            with folder.held():
+                shutil.rmtree(folder.path)
             return train(config, shows_progress=False)
         again = replace(config, resume=folder.path, hyperparameters=None)
         return train(again, shows_progress=False)

@@ -1,6 +1,7 @@
 """Many trainings side by side: what is there is kept, and what was interrupted is gone on with."""
 
 import os
+import shutil
 import signal
 import threading
 import time
@@ -13,6 +14,7 @@ from defmanip_gym.baselines.learned.agents import load_agent
 from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import ParameterError, RunFolderError
 from defmanip_gym.training.hyperparameters import load_hyperparameters
+from defmanip_gym.training.run_folder import RunFolder
 from defmanip_gym.training.trainings import run_trainings, train_or_go_on
 from defmanip_gym.training.trainings_config import TrainingsConfig
 
@@ -69,15 +71,21 @@ def test_finished_trainings_are_kept_and_missing_ones_added(config):
     assert load_agent(added / "last.json").card.seed == 1
 
 
-def test_a_run_that_ended_before_its_first_checkpoint_begins_anew(config, tmp_path):
+def test_a_run_that_ended_before_its_first_checkpoint_begins_anew(config):
     (run,) = config(seeds=(0,)).runs
     path = train_or_go_on(run)
-    for checkpoint in (path / "checkpoints").iterdir():
-        for file in checkpoint.iterdir():
-            file.unlink()
-        checkpoint.rmdir()
+    shutil.rmtree(path / "checkpoints")
     assert train_or_go_on(run) == path
     assert load_agent(path / "last.json").card.total_timesteps == STEPS
+
+
+def test_a_run_that_train_py_is_at_is_left_alone(config):
+    (run,) = config(seeds=(0,)).runs
+    path = train_or_go_on(run)
+    shutil.rmtree(path / "checkpoints")  # as before its first one
+    with RunFolder(path).held(), pytest.raises(RunFolderError, match="nobody trains"):
+        train_or_go_on(run)
+    assert (path / "config.json").is_file()
 
 
 def test_a_run_with_other_settings_is_not_gone_on_with(config):
