@@ -26,7 +26,7 @@ from defmanip_gym.validation import require_choice, require_positive
 from defmanip_gym.wrappers.filter_for import filter_for
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxActionScaling, NuMaxVectorActionScaling
 from defmanip_gym.wrappers.safety_filter import SafetyFilterVectorWrapper, SafetyFilterWrapper
-from defmanip_gym.wrappers.transport import delay_periods, transport_config
+from defmanip_gym.wrappers.transport import known_delay_periods, transport_config
 
 PAPERS = "tanner"
 
@@ -81,7 +81,7 @@ def residual_base(env: Any, *, base: str, inside: str, authority: float) -> Resi
     if inside in STORAGE_FILTERS:
         return ResidualBase(
             controller=corrected_controller(base, config),
-            protection=shared_filter(config, inside, delay_periods(env)),
+            protection=shared_filter(config, inside, known_delay_periods(env)),
             authority=filter_authority(authority),
         )
     require_choice(f"base inside {inside}", base, (PAPERS,))
