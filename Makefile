@@ -13,13 +13,6 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 # Processes that run tests; 0 is one, without another to start it
 WORKERS := 2
 
-# A run folder names environment, recipe and seed
-SEEDS := 0 1 2 3 4
-RECIPES := ppo residual lagrangian sac tqc
-RUNS := $(foreach recipe,$(RECIPES),$(SEEDS:%=runs/DeformTransport-v0-$(recipe)-seed%)) \
-        $(SEEDS:%=runs/DeformTransportRandomized-v0-ppo-seed%)
-recipe_and_seed = --algo $(firstword $(subst -seed, ,$*))$(1) --seed $(lastword $(subst -seed, ,$*))
-
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
@@ -58,14 +51,12 @@ benchmark: $(CORE)  ## run all suites with all agents; writes docs/results.md an
 committed:
 	@git diff --quiet HEAD || { echo "Commit your changes first: cards name the revision."; exit 1; }
 
-agents: $(RUNS)  ## train and ship all agents, half a day; runs that are there are kept
-	$(BIN)/defmanip ship $(RUNS)
-
-runs/DeformTransport-v0-%: | $(INSTALLED) committed
-	$(BIN)/python train.py $(call recipe_and_seed)
-
-runs/DeformTransportRandomized-v0-%: | $(INSTALLED) committed
-	$(BIN)/python train.py $(call recipe_and_seed, --env DeformTransportRandomized-v0)
+agents: $(INSTALLED) committed  ## train and ship all agents, half a day; runs that are there are kept
+	$(BIN)/defmanip trainings
+	$(BIN)/defmanip trainings --env DeformTransportRandomized-v0 --algos ppo
+	$(BIN)/defmanip trainings --env DeformTransport-v1 --algos ppo --filter storage
+	$(BIN)/defmanip trainings --env DeformTransportRandomized-v1 --algos ppo --filter storage
+	$(BIN)/defmanip ship runs/*
 
 test: $(INSTALLED)  ## run the test suite
 	$(BIN)/python -m pytest --numprocesses $(WORKERS)

@@ -51,16 +51,12 @@ def _shown_controller(name: str) -> tuple[str, ...]:
 
 
 def _shown(family: str) -> tuple[str, ...]:
-    """Return a family's names: alone, inside the filter, inside what it learned in.
-
-    And on the inner loop that feels the load, as the ladder's controllers run on that one.
-    """
+    """Return a family's names: alone, inside the filter, inside what it learned in."""
     trained_in = load_family(family)[0].card.trained_inside
     options = (
         (FILTER_OPTION,) if trained_in in (None, FILTER_OPTION) else (FILTER_OPTION, trained_in)
     )
-    inside = (f"{family}/{option}" for option in options)
-    return (family, *inside, *(f"{other}/{FILTER_OPTION}" for other in _on_the_other(family)))
+    return (family, *(f"{family}/{option}" for option in options))
 
 
 def _on_the_other(family: str) -> tuple[str, ...]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shlex
-import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +36,8 @@ from defmanip_gym.training.run_folder import LAST_AGENT, RunFolder
 from defmanip_gym.training.sources import sources_digest
 from defmanip_gym.training.validation_callback import ValidationCallback
 from defmanip_gym.version import __version__
+
+_NOT_OF_THE_RUN = ("algo", "seed", "output", "num_threads", "resume")  # two are told anyway
 
 
 def train(config: TrainConfig, *, shows_progress: bool = True) -> Path:
@@ -182,4 +183,14 @@ def _folder(config: TrainConfig, hyperparameters: dict[str, Any]) -> RunFolder:
     """Return the folder of a resumed run, or make one."""
     if config.resume is not None:
         return RunFolder(config.resume)
-    return RunFolder.create(config, hyperparameters, shlex.join(["python", *sys.argv]))
+    return RunFolder.create(config, hyperparameters, command_of(config))
+
+
+def command_of(config: TrainConfig) -> str:
+    """Return the command that makes a run, whatever began it: what changes nothing is left out."""
+    words = ["python", "train.py", "--algo", config.algo]
+    for field in fields(TrainConfig):
+        value = getattr(config, field.name)
+        if field.name not in _NOT_OF_THE_RUN and value != field.default:
+            words += [f"--{field.name.replace('_', '-')}", str(value)]
+    return shlex.join([*words, "--seed", str(config.seed)])

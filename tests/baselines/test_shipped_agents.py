@@ -10,8 +10,13 @@ from defmanip_gym.baselines.learned.agents import (
     load_family,
     shipped_families,
 )
-from defmanip_gym.baselines.learned.deployment import controller_of
-from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
+from defmanip_gym.baselines.learned.deployment import controller_of, deployed
+from defmanip_gym.envs.registration import (
+    ENV_ID,
+    QUICK_ENV_ID,
+    RANDOMIZED_ENV_ID,
+    ROBUST_ENV_ID,
+)
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED
 from defmanip_gym.params import BeamParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, certify
@@ -19,7 +24,7 @@ from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
 
 EPISODES, HORIZON_S = 40, 40.0
 # masses at the ends of the randomized range are beyond most of what was learned so far
-FLOORS = {ENV_ID: 0.8, RANDOMIZED_ENV_ID: 0.6}
+FLOORS = {ENV_ID: 0.8, RANDOMIZED_ENV_ID: 0.6, QUICK_ENV_ID: 0.98, ROBUST_ENV_ID: 0.9}
 
 
 def successes(agent):
@@ -37,6 +42,8 @@ def successes(agent):
         )
         env = NuMaxVectorActionScaling(env, certificate)
     controller, state = controller_of(agent, certificate=certificate), None
+    if agent.card.safety_filter is not None:
+        controller = deployed(agent)
     observation, _ = env.reset(seed=FIRST_EVALUATION_SEED)
     running, succeeded = np.ones(EPISODES, dtype=bool), np.zeros(EPISODES, dtype=bool)
     while running.any():

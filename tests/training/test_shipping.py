@@ -17,12 +17,18 @@ from small_agents import small_agent
 
 from defmanip_gym.baselines.learned.agents import load_family, shipped_families
 from defmanip_gym.cli import main
-from defmanip_gym.envs.registration import ENV_ID, RANDOMIZED_ENV_ID
+from defmanip_gym.envs.registration import (
+    ENV_ID,
+    QUICK_ENV_ID,
+    RANDOMIZED_ENV_ID,
+    ROBUST_ENV_ID,
+)
 from defmanip_gym.errors import AgentFileError, RunFolderError
-from defmanip_gym.training.config import Recipe, TrainConfig
+from defmanip_gym.training.config import Recipe
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.ship_config import ShipConfig
 from defmanip_gym.training.shipping import ship
+from defmanip_gym.training.trainings_config import TrainingsConfig
 
 ROOT = Path(__file__).parents[2]
 
@@ -152,12 +158,11 @@ def test_make_agents_trains_and_ships_every_recipe_with_five_seeds():
         text=True,
         check=True,
     )
-    lines = answer.stdout.splitlines()
-    commands = [shlex.split(line.partition("train.py")[2]) for line in lines if "train.py" in line]
-    configs = [tyro.cli(TrainConfig, args=words) for words in commands]
+    commands = [shlex.split(line) for line in answer.stdout.splitlines() if "defmanip" in line]
+    assert commands[-1][1:] == ["ship", "runs/*"] and commands[-2][1] == "trainings"
+    trainings = [tyro.cli(TrainingsConfig, args=words[2:]) for words in commands[:-1]]
+    runs = [(run.algo, run.env_id, run.seed) for config in trainings for run in config.runs]
     expected = {(recipe, ENV_ID, seed) for recipe in get_args(Recipe) for seed in range(5)}
-    expected |= {("ppo", RANDOMIZED_ENV_ID, seed) for seed in range(5)}
-    assert {(c.algo, c.env_id, c.seed) for c in configs} == expected and len(configs) == 30
-    (shipping,) = [shlex.split(line) for line in lines if "defmanip ship" in line]
-    folders = {f"runs/{env}-{recipe}-seed{seed}" for recipe, env, seed in expected}
-    assert set(shipping[2:]) == folders
+    for env_id in (RANDOMIZED_ENV_ID, QUICK_ENV_ID, ROBUST_ENV_ID):
+        expected |= {("ppo", env_id, seed) for seed in range(5)}
+    assert set(runs) == expected and len(runs) == len(expected)

@@ -1,11 +1,14 @@
 """Training runs leave complete folders, go on where they stopped, and export what they learned."""
 
 import json
+import shlex
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+import tyro
 import yaml
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
@@ -49,6 +52,22 @@ def sb3_actions(folder, config, observations):
     """The actions of the run's last SB3 model, normalized as in training."""
     model, venv = last_model(folder, config)
     return model.predict(venv.normalize_obs(observations), deterministic=True)[0]
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        TrainConfig(),
+        TrainConfig(algo="sac", env="DeformTransport-v1", filter="storage", seed=3),
+        TrainConfig(certificate="l1", total_timesteps=10, evaluations=3, num_threads=2),
+        TrainConfig(hyperparameters=Path("my ppo.yml"), output=Path("elsewhere")),
+    ],
+)
+def test_a_run_tells_a_command_that_makes_it_again(settings):
+    python, script, *words = shlex.split(training.command_of(settings))
+    assert (python, script) == ("python", "train.py")
+    again = tyro.cli(TrainConfig, args=words)
+    assert again == replace(settings, output=again.output, num_threads=again.num_threads)
 
 
 @pytest.mark.parametrize("algo", ["ppo", "sac", "tqc", "residual", "lagrangian"])
