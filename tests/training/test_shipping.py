@@ -24,7 +24,7 @@ from defmanip_gym.envs.registration import (
     ROBUST_ENV_ID,
 )
 from defmanip_gym.errors import AgentFileError, RunFolderError
-from defmanip_gym.training.config import Recipe
+from defmanip_gym.training.config import Recipe, TrainConfig
 from defmanip_gym.training.hyperparameters import load_hyperparameters
 from defmanip_gym.training.ship_config import ShipConfig
 from defmanip_gym.training.shipping import ship
