@@ -31,8 +31,9 @@ III, beyond        ``filters``: ``storage``, Lemma III.1's V as a barrier; ``saf
                    ``barrier_rows``: the literature's; ``family``; ``viability``,
                    ``viability_bounds``: what is possible at all, ``viability_share``
 IV.A, V            ``control``: ``velocity_field`` IV.A, ``ways``, ``oriented_field``,
-                   ``time_to_go``; ``control_laws`` (20), (27), (29); ``continuous_loop`` (30)–(34); ``stability``,
-                   ``effective_damping``: what sampling and wrong parameters make of it;
+                   ``time_to_go``; ``control_laws`` (20), (27), (29); ``continuous_loop`` (30)–(34);
+                   ``stability``, ``effective_damping``: what sampling and wrong parameters make
+                   of it;
                    ``disk_margin``, ``gain_search``: gains for the object at hand;
                    ``disturbance_observer``, ``swing_following``, ``observed_loop``: without a model
 IV, beyond         ``control``: ``settling_field``, ``moving_reference``: what regulators and
