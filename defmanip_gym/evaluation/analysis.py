@@ -52,6 +52,11 @@ class SuiteAnalysis:
     certified_duel: Duel | None
 
     @property
+    def main_duel(self) -> Duel | None:
+        """The duel inside filters, or, where there is none, without."""
+        return self.certified_duel or self.free_duel
+
+    @property
     def tables(self) -> tuple[EpisodeTable, ...]:
         """Episodes of each contestant."""
         return tuple(scores.table for scores in self.scores)

@@ -14,6 +14,7 @@ from rich.table import Table
 from defmanip_gym.evaluation.config import ComparisonConfig
 from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.filter_timings import FILTER_TIMING_FILE, read_filter_times
+from defmanip_gym.evaluation.plots.overview import Best, plot_overview
 from defmanip_gym.evaluation.records import EpisodeRecord
 from defmanip_gym.evaluation.report.exports import (
     latex_filter_table,
@@ -22,8 +23,10 @@ from defmanip_gym.evaluation.report.exports import (
     markdown_table,
     write_csv,
 )
-from defmanip_gym.evaluation.report.page import Section, Setting, write_page
-from defmanip_gym.evaluation.report.section_builder import SectionBuilder
+from defmanip_gym.evaluation.report.figures import drawn
+from defmanip_gym.evaluation.report.page import Answer, Section, Setting, write_page
+from defmanip_gym.evaluation.report.section_builder import PLOT_FOLDER, SectionBuilder
+from defmanip_gym.evaluation.report.sentences import answer
 from defmanip_gym.evaluation.report.terminal import filter_terminal_table, terminal_table
 from defmanip_gym.evaluation.suites import HORIZON_S, suite_named
 from defmanip_gym.evaluation.timings import TIMING_FILE, read_timings
@@ -63,12 +66,33 @@ def write_outputs(
     report = config.output / REPORT_FILE
     write_page(
         report,
+        answer=_answer(sections, config),
         sections=sections,
         contestants=contestants,
         settings=_settings(),
         command=config.command,
     )
     return sections, report
+
+
+def _answer(sections: Sequence[Section], config: ComparisonConfig) -> Answer | None:
+    """Return what learning adds, if both kinds took part."""
+    best = []
+    for section in sections:
+        duel = section.analysis.main_duel
+        if duel is not None:
+            summaries = {each.contestant: each for each in section.analysis.summaries}
+            analytic, learned = summaries[duel.result.analytic], summaries[duel.result.learned]
+            best.append(Best(section.suite, analytic, learned))
+    if not best:
+        return None
+    picture = drawn(
+        plot_overview(best),
+        config.output / PLOT_FOLDER / "overview.png",
+        config.command,
+        alt="score of the best analytic and the best learned contestant in each suite",
+    )
+    return Answer(text=answer([section.analysis for section in sections]), picture=picture)
 
 
 def print_results(console: Console, sections: Sequence[Section], report: Path) -> None:

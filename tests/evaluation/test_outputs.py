@@ -95,6 +95,12 @@ def test_every_table_figure_and_animation_names_its_command(comparison, html):
         assert Image.open(path).info["Comment"] == f"Made by: {command}"
 
 
+def test_the_report_begins_with_the_answer_and_its_picture(html):
+    answer = html.index("Learning adds ")
+    picture = html.index('alt="score of the best analytic and the best learned contestant')
+    assert html.index("<h1>") < answer < picture < html.index("<nav")
+
+
 def test_the_best_of_each_kind_is_shown_and_the_rest_on_demand(html):
     visible = re.sub(r"<details>.*?</details>", "", html, flags=re.DOTALL)
     assert 'alt="phase-tanner+l1 in suite nominal"' in visible
@@ -144,6 +150,7 @@ def test_nothing_but_whole_files_is_left(comparison):
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     others = {name for name in names if not name.startswith(("traces/", "plots/nominal/"))}
     assert others == {
+        "plots/overview.png",
         "timings.json",
         "summary.csv",
         "report.html",

@@ -58,6 +58,14 @@ class FigureGroup:
     more: tuple[Panel, ...] = ()
 
 
+def drawn(figure: Figure, path: Path, made_by: str, *, alt: str) -> Panel:
+    """Write a figure's file and return it as the page embeds it."""
+    png, width, height = as_png(figure, made_by)
+    write_atomically(path, png)
+    encoded = base64.b64encode(png).decode("ascii")
+    return Panel(alt=alt, data_uri=f"data:image/png;base64,{encoded}", width=width, height=height)
+
+
 class ReachableSets:
     """Edges of what filters keep the swing in, computed once each."""
 
@@ -204,15 +212,8 @@ class SuiteFigures:
         return groups
 
     def _panel(self, name: str, figure: Figure) -> Panel:
-        png, width, height = as_png(figure, self.made_by)
-        write_atomically(self.folder / self.analysis.suite / f"{name}.png", png)
-        encoded = base64.b64encode(png).decode("ascii")
-        return Panel(
-            alt=f"{name} in suite {self.analysis.suite}",
-            data_uri=f"data:image/png;base64,{encoded}",
-            width=width,
-            height=height,
-        )
+        path = self.folder / self.analysis.suite / f"{name}.png"
+        return drawn(figure, path, self.made_by, alt=f"{name} in suite {self.analysis.suite}")
 
     def _key(self, trace: Trace) -> tuple[str, str, str]:
         return trace.contestant, trace.member, trace.scenario

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from defmanip_gym.evaluation.analysis import SuiteAnalysis
 from defmanip_gym.evaluation.contestant import Contestant
 from defmanip_gym.evaluation.report.animation import Animation
 from defmanip_gym.evaluation.report.columns import COLUMNS, Row
-from defmanip_gym.evaluation.report.figures import FigureGroup
+from defmanip_gym.evaluation.report.figures import FigureGroup, Panel
 from defmanip_gym.evaluation.report.filter_columns import FILTER_COLUMNS, FilterRow
 from defmanip_gym.evaluation.report.sentences import Claim
 from defmanip_gym.files import write_atomically
@@ -22,6 +23,7 @@ class Section:
     """A suite's part of the page.
 
     Attributes:
+        analysis: of the suite.
         suite: name.
         description: of the suite.
         size: how much was run, in words.
@@ -33,6 +35,7 @@ class Section:
         animations: in order.
     """
 
+    analysis: SuiteAnalysis
     suite: str
     description: str
     size: str
@@ -42,6 +45,19 @@ class Section:
     filters: tuple[FilterRow, ...]
     figures: tuple[FigureGroup, ...]
     animations: tuple[Animation, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What the report says first.
+
+    Attributes:
+        text: what learning adds, in a sentence or two.
+        picture: the best of both kinds on each suite.
+    """
+
+    text: str
+    picture: Panel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +71,7 @@ class Setting:
 def write_page(
     path: Path,
     *,
+    answer: Answer | None,
     sections: Sequence[Section],
     contestants: Sequence[Contestant],
     settings: Sequence[Setting],
@@ -64,6 +81,7 @@ def write_page(
 
     Args:
         path: of the HTML file.
+        answer: at the top; None without learned or without analytic contestants.
         sections: one for each suite.
         contestants: who took part.
         settings: of the comparison, and versions of the software.
@@ -78,6 +96,7 @@ def write_page(
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
     html = environment.get_template("report.html.j2").render(
+        answer=answer,
         sections=sections,
         contestants=contestants,
         colours={contestant.name: contestant.colour for contestant in contestants},

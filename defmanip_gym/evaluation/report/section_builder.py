@@ -60,6 +60,7 @@ class SectionBuilder:
         analysis = analyse(records, suite.name, order=list(by_name), certified=certified)
         traces = self._traces(suite)
         return Section(
+            analysis=analysis,
             suite=suite.name,
             description=suite.description,
             size=_size(analysis),
