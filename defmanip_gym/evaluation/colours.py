@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from defmanip_gym.evaluation.options import OPTIONS, OTHER_INNER_LOOP
 
-GUEST_COLOURS = ("#7a5195", "#c77dba")  # of the user's own agents
+GUEST_COLOURS = ("#7a5195", "#c77dba", "#e3bfdd")  # of the user's own agents
 
 
 def contestant_colour(base: str, method: str) -> str:

@@ -37,6 +37,8 @@ from defmanip_gym.observation import ObservationLayout
 
 # env_kwargs
 _OF_THE_PLANT = frozenset({"beam", "beam_ranges", "robot", "disturbance", "disturbance_ranges"})
+# by their colours; what else an agent was trained inside has the last one
+_GUEST_OPTIONS = ("", FILTER_OPTION)
 
 
 def family_contestant(
@@ -76,8 +78,8 @@ def agent_contestants(
     *,
     allow_pickle: bool = False,
     normalization: str | None = None,
-) -> tuple[Contestant, Contestant]:
-    """Return an agent of the user's, without and with the safety filter.
+) -> tuple[Contestant, ...]:
+    """Return an agent of the user's: alone, inside the filter, and inside what it learned in.
 
     Its name ends in a digest of the agent, so that records of another never pass for its own.
 
@@ -97,7 +99,8 @@ def agent_contestants(
             "normalization", normalization, f"nothing with {path}", "It is no zip file of SB3."
         )
     actor = load_agent(path)
-    return _guest(path, actor, "", certificates), _guest(path, actor, FILTER_OPTION, certificates)
+    options = dict.fromkeys(("", FILTER_OPTION, actor.card.trained_inside or ""))
+    return tuple(_guest(path, actor, option, certificates) for option in options)
 
 
 def agent_as_trained(path: Path, certificates: Certificates) -> Contestant:
@@ -118,7 +121,7 @@ def _guest(path: Path, actor: MlpActor, method: str, certificates: Certificates)
         (actor,),
         method,
         f"{actor.card.algorithm} agent made by `{actor.card.command}`",
-        GUEST_COLOURS[bool(method)],
+        GUEST_COLOURS[_GUEST_OPTIONS.index(method) if method in _GUEST_OPTIONS else -1],
         certificates,
         training_config(actor.card).inner_loop,
     )

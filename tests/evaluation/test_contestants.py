@@ -155,6 +155,16 @@ def test_agents_of_one_folder_name_stay_apart(tmp_path):
     assert plain.protection is None and certified.protection is not None
 
 
+def test_an_agent_is_also_shown_inside_what_it_learned_in(tmp_path):
+    specification = StorageFilter().specification | {"name": "backup"}
+    changes = {"safety_filter": "backup", "filter_specification": specification}
+    agent(changes).save(tmp_path / "agent")
+    shown = agent_contestants(tmp_path, Certificates())
+    options = [contestant.name.partition("/")[2] for contestant in shown]
+    assert options == ["", FILTER_OPTION, "backup"]
+    assert len({contestant.colour for contestant in shown}) == 3
+
+
 def test_an_agent_for_other_observations_is_refused(tmp_path):
     agent(size=SIZE + 2).save(tmp_path / "agent")
     with pytest.raises(AgentFileError, match=rf"{SIZE + 2}.*{SIZE}"):
