@@ -29,6 +29,7 @@ BENCHMARK = DOCS.parent / "results" / "benchmark"
 IMAGES = "images/results"
 _MACHINES_OWN = "Decision"  # columns with this heading hold wall times
 _FIGURES = {
+    "overview": "Score (IQM) of the best analytic and the best learned contestant inside filters.",
     "forest": "Score (IQM) of each contestant, with 95 % intervals.",
     "profiles": "Share of episodes that score above τ, for the best of each kind.",
     "conditions": "Score (IQM) by condition, for the best of each kind, with 95 % intervals.",
@@ -38,6 +39,7 @@ _HEAD = """# Results
 
 {answer}
 
+{overview}
 Learned against analytic controllers on all suites, with all agents. `make benchmark` makes this
 page: it runs
 
@@ -98,7 +100,13 @@ def write_results(benchmark: Path = BENCHMARK, docs: Path = DOCS) -> Path:
     }
     told = answer(tuple(analyses.values()))
     certificates = _certificates(records.values())
-    parts = [_HEAD.format(answer=told, command=command[1], certificates=certificates)]
+    picture = benchmark / "plots" / "overview.png"
+    shown = _figure(picture, picture.stem, docs, command[1]) if picture.exists() else []
+    parts = [
+        _HEAD.format(
+            answer=told, overview="\n".join(shown), command=command[1], certificates=certificates
+        )
+    ]
     for suite in present:
         analysis = analyses[suite.name]
         held = certificate_claim(records[suite.name])
@@ -153,13 +161,19 @@ def _figures(benchmark: Path, docs: Path, suite: str, command: str) -> list[str]
     """Copy the figures that matter and return their lines."""
     folder = benchmark / "plots" / suite
     second = "conditions" if (folder / "conditions.png").exists() else "profiles"
+    return [
+        line
+        for name in ("forest", second)
+        for line in _figure(folder / f"{name}.png", f"{suite}-{name}", docs, command)
+    ]
+
+
+def _figure(source: Path, target: str, docs: Path, command: str) -> list[str]:
+    """Copy a figure and return its lines."""
     (docs / IMAGES).mkdir(parents=True, exist_ok=True)
-    lines = []
-    for name in ("forest", second):
-        target = f"{IMAGES}/{suite}-{name}.png"
-        shutil.copyfile(folder / f"{name}.png", docs / target)
-        lines += [f"![{_FIGURES[name]}]({target})\n", f"{_FIGURES[name]} Made by `{command}`.\n"]
-    return lines
+    path, told = f"{IMAGES}/{target}.png", _FIGURES[source.stem]
+    shutil.copyfile(source, docs / path)
+    return [f"![{told}]({path})\n", f"{told} Made by `{command}`.\n"]
 
 
 def _titles(columns: Sequence[Column[Any]]) -> list[str]:
