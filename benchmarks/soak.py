@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -197,6 +198,7 @@ def _size(path: Path) -> int | None:
 def main(config: SoakConfig) -> int:
     """Run, print the report and return the exit code."""
     console = Console()
+    warnings.filterwarnings("ignore", message=".*out of date")  # v0 beside v1
     report = soak(config, console)
     watched = not math.isnan(report.growth_mib)
     growth = f"grew by {report.growth_mib:.1f} MiB" if watched else "was not watched: no step"

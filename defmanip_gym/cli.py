@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -132,6 +133,8 @@ def _run_training(
 
 def _guarded(command: Callable[[], None]) -> None:
     """Show this package's own errors as messages, and end quietly when nobody reads on."""
+    # whoever asks for v0 means it
+    warnings.filterwarnings("ignore", message=".*DeformTransport.* is out of date")
     try:
         try:
             command()

@@ -162,7 +162,8 @@ def test_without_opengl_there_is_an_error_until_there_is_one(monkeypatch, lone):
 
 
 SCRIPT = """
-import os, signal, sys, gymnasium, defmanip_gym
+import os, signal, sys, warnings, gymnasium, defmanip_gym
+warnings.filterwarnings("ignore", message=".*out of date")  # v0 beside v1
 from defmanip_gym.errors import RenderingError
 
 def draw():

@@ -236,7 +236,7 @@ def test_evaluate_policy_reads_the_statistics_of_the_episodes(recwarn):
     returns, lengths = evaluate_policy(Still(), venv, 7, return_episode_rewards=True)
     assert lengths == [6] * 7
     assert len(set(returns)) == 7
-    assert not recwarn.list
+    assert not [warning for warning in recwarn.list if "out of date" not in str(warning.message)]
 
 
 def test_attributes_and_wrappers_are_those_of_the_batch():

@@ -81,6 +81,7 @@ def test_exported_agent_acts_as_the_trained_model(algo, config):
     stored = json.loads((folder / "config.json").read_text())
     assert stored["train"]["algo"] == algo and stored["git_revision"]
     assert {path.name for path in folder.iterdir()} == {
+        ".lock",
         "config.json",
         "curves",
         "checkpoints",
