@@ -34,7 +34,8 @@ class RisingDiscount(BaseCallback):
         self._first = 0.0
 
     def _init_callback(self) -> None:
-        self._first = self.model.gamma  # type: ignore[attr-defined]
+        model: Any = self.model
+        self._first = model.gamma
 
     def _on_training_start(self) -> None:
         self._set()
