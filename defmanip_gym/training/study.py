@@ -116,7 +116,7 @@ def is_as_in_the_file(trial: optuna.Trial | FrozenTrial) -> bool:
 
 def _settings(config: TuneConfig) -> dict[str, Any]:
     """Return all that a trial's score depends on besides what is varied, as JSON keeps it."""
-    names = ("timesteps", "evaluations", "evaluation_episodes", "seed", "seeds")
+    names = ("filter", "timesteps", "evaluations", "evaluation_episodes", "seed", "seeds")
     settings = {name: getattr(config, name) for name in names}
     settings |= {"package_version": __version__, "hyperparameters": _varied(config)}
     return json.loads(json.dumps(settings))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, cast, get_args
 
 from defmanip_gym.envs.registration import ENV_ID, ENV_IDS
+from defmanip_gym.errors import ParameterError
 from defmanip_gym.training.config import Recipe, TrainConfig
 from defmanip_gym.validation import MOST_WORKERS, require_choice, require_whole, settle
 
@@ -31,6 +32,8 @@ class TuneConfig:
         defmanip tune --algo tanner
 
         defmanip tune --algo sac --trials 10 --timesteps 200000 --output runs/tuning
+
+        defmanip tune --algo ppo --env DeformTransport-v1 --filter storage
     """
 
     algo: Recipe | AnalyticName = "ppo"
@@ -38,6 +41,9 @@ class TuneConfig:
 
     env: str = ENV_ID
     """Environment id."""
+
+    filter: str | None = None
+    """Let recipes train inside this safety filter; residual has its own protection."""
 
     trials: int = 20
     """Trials that the study has in the end, those of earlier runs included; of an analytic
@@ -72,11 +78,15 @@ class TuneConfig:
     def __post_init__(self) -> None:
         require_choice("algo", self.algo, (*get_args(Recipe), *get_args(AnalyticName)))
         require_choice("env", self.env, ENV_IDS)
+        if self.is_analytic and self.filter is not None:
+            raise ParameterError(
+                "filter", self.filter, "None for an analytic controller", "Leave --filter out."
+            )
         settle(self, "trials", require_whole, 1)
         settle(self, "timesteps", require_whole, 1)
         settle(self, "seeds", require_whole, 1, _MOST_SEEDS)
         settle(self, "jobs", require_whole, 1, MOST_WORKERS)
-        for name in ("evaluations", "evaluation_episodes", "seed", "num_threads"):
+        for name in ("filter", "evaluations", "evaluation_episodes", "seed", "num_threads"):
             # which checks the rest
             object.__setattr__(self, name, getattr(self.training(0), name))
 
@@ -86,6 +96,7 @@ class TuneConfig:
             algo="ppo" if self.is_analytic else cast(Recipe, self.algo),
             env=self.env,
             seed=self.seed + number,
+            filter=self.filter,
             total_timesteps=self.timesteps,
             evaluations=self.evaluations,
             evaluation_episodes=self.evaluation_episodes,
@@ -96,6 +107,11 @@ class TuneConfig:
     def is_analytic(self) -> bool:
         """Whether a controller is tuned that nobody trains."""
         return self.algo in get_args(AnalyticName)
+
+    @property
+    def name(self) -> str:
+        """Of the study's folder."""
+        return "-".join(part for part in (self.env, self.algo, self.filter) if part is not None)
 
     @property
     def step_budget(self) -> int:

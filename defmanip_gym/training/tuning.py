@@ -50,7 +50,7 @@ def run_tune(config: TuneConfig) -> Path:
     """
     console = Console()
     torch.set_num_threads(1)
-    folder = config.output / f"{config.env}-{config.algo}"
+    folder = config.output / config.name
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / ".lock", timeout=0):
@@ -141,7 +141,7 @@ def _objective(config: TuneConfig, trial: optuna.Trial) -> float:
         return analytic_objective(config, trial)
     hyperparameters = load_hyperparameters(None, config.algo, config.env)
     if not is_as_in_the_file(trial):
-        hyperparameters |= SEARCH_SPACES[config.algo](trial)
+        hyperparameters |= SEARCH_SPACES[config.algo](trial, hyperparameters)
     scores: list[float] = []
     while len(scores) < config.seeds:
         scores.append(_training_score(config, trial, hyperparameters, scores))
