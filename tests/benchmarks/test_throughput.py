@@ -19,7 +19,7 @@ def run(tmp_path):
         ended = subprocess.run(
             [
                 sys.executable,
-                ROOT / "benchmarks" / "throughput.py",
+                ROOT / "benchmarks" / "speed" / "throughput.py",
                 *words.split(),
                 *"--rounds 2 --turn-s 0.01".split(),
             ],

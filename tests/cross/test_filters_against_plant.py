@@ -13,7 +13,7 @@ from defmanip_gym.theory.filters.conditions import FilterConditions
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.wrappers.filter_errors import filter_errors
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "attacks"))
 import attack_filters  # noqa: E402
 
 

@@ -9,8 +9,8 @@ Candidates learn in turn, several rounds, and ratios are taken within a round:
 All with as many PyTorch threads as our training uses. Off-policy candidates first collect what
 they need before they update.
 
-    python benchmarks/training.py
-    python benchmarks/training.py --algos ppo --steps 32768 --rounds 5
+    python benchmarks/speed/training.py
+    python benchmarks/speed/training.py --algos ppo --steps 32768 --rounds 5
 """
 
 from __future__ import annotations

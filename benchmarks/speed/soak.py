@@ -5,8 +5,8 @@ each has had some; actions are uniform or held at their limits. Fails where an o
 or info is not finite, memory grows, or MuJoCo writes to the standard error stream or its log file.
 Failed simulations are counted: they are an outcome, reported in ``info``.
 
-    python benchmarks/soak.py
-    python benchmarks/soak.py --steps 1_000_000 --num-envs 64
+    python benchmarks/speed/soak.py
+    python benchmarks/speed/soak.py --steps 1_000_000 --num-envs 64
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What it took to learn to be quick: PPO's recipe for v1 with one thing changed at a time.
 
-    python benchmarks/reward_ablation.py --jobs 2
-    python benchmarks/reward_ablation.py --variants "v0's reward" --seeds 0 --timesteps 2000000
+    python benchmarks/learning/reward_ablation.py --jobs 2
+    python benchmarks/learning/reward_ablation.py --variants "v0's reward" --seeds 0
 
 Every variant is trained inside the storage filter, on the inner loop that feels the load, and
 scored on the validation starts. Finished trainings are kept, and interrupted ones go on.

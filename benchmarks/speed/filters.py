@@ -2,7 +2,7 @@
 
 Actions are stored beforehand; half of them pump the swing, so that filters have something to do.
 
-    python benchmarks/filters.py
+    python benchmarks/speed/filters.py
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Images of a batch from its one renderer against as many renderers as episodes.
 
-python benchmarks/images.py --num-envs 64 --size 84
+python benchmarks/speed/images.py --num-envs 64 --size 84
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ as they must (``objects.rig_robot``); half of the errors feed the swing, half ar
 of the starts store just the level. A case is a line of the output; cases that are there are not run
 again.
 
-    python benchmarks/attack_objects.py --cases 60
+    python benchmarks/attacks/attack_objects.py --cases 60
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ them with the room for errors that ``certificate_for`` finds, the others with th
 ``TRANSPORT_CONDITIONS``. Attackers then push in resonance with the swing while they turn and lift
 as wildly as they can. A case is a line of the output; cases that are there are not run again.
 
-    python benchmarks/attack_environments.py --cases 400 --output results/attacks.jsonl
+    python benchmarks/attacks/attack_environments.py --cases 400 --output results/attacks.jsonl
 """
 
 from __future__ import annotations

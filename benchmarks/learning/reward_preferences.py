@@ -5,8 +5,8 @@ From there on it goes on itself, or another controller takes over. Both continua
 several rewards and discounts: where the quicker one has the smaller return, a learner that values
 returns like that is right to be slow.
 
-    python benchmarks/reward_preferences.py
-    python benchmarks/reward_preferences.py --agent tqc --rivals field mpc --distances 1 3
+    python benchmarks/learning/reward_preferences.py
+    python benchmarks/learning/reward_preferences.py --agent tqc --rivals field mpc --distances 1 3
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Draws beams, certifies each with ``l1`` and with what of it is proven for the no
 (``Certificate.proven``), and attacks both on the MuJoCo plant. Lines go to a file as they are made;
 a broken proof is a problem and ends the study with 1.
 
-    python benchmarks/nonlinearity.py --beams 100
-    python benchmarks/nonlinearity.py --beams 20 --sigma 0.25 --segments 2
+    python benchmarks/attacks/nonlinearity.py --beams 100
+    python benchmarks/attacks/nonlinearity.py --beams 20 --sigma 0.25 --segments 2
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ with ``filter_for``. A thousand attackers (``filter_attackers``) then play throu
 them from starts whose storage is just the filter's level. A case is a line of the output; cases
 that are there are not run again.
 
-    python benchmarks/attack_filters.py --filter storage --cases 120
+    python benchmarks/attacks/attack_filters.py --filter storage --cases 120
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Resident memory of this process, and what the batched environment needs per episode.
 
-python benchmarks/resident_memory.py --num-envs 4096 --control-mode force
+python benchmarks/speed/resident_memory.py --num-envs 4096 --control-mode force
 """
 
 from __future__ import annotations

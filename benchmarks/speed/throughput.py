@@ -6,8 +6,8 @@ stored, not sampled; episodes that end are reset by every candidate, and their r
 (but not in the section marks); physics alone runs on the same model and as many threads, in states
 that random forces reach from the environment's starts, none of which diverge.
 
-    python benchmarks/throughput.py
-    python benchmarks/throughput.py --sections batch core --num-envs 256 --control-modes force
+    python benchmarks/speed/throughput.py
+    python benchmarks/speed/throughput.py --sections batch core --num-envs 256 --control-modes force
 """
 
 from __future__ import annotations

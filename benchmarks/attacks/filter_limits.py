@@ -4,7 +4,7 @@ Each line is a size of one deviation: the share of V_σ that a filter made for i
 is none), what attackers reach through that, and what they reach through the nominal filter, whose
 promise then does not apply.
 
-    python benchmarks/filter_limits.py
+    python benchmarks/attacks/filter_limits.py
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How much training it takes until 95 % of the validation starts succeed.
 
-    python benchmarks/steps_to_arrive.py runs/*
+    python benchmarks/learning/steps_to_arrive.py runs/*
 
 prints a row for each recipe: the median over its runs of environment steps and minutes until the
 first evaluation with so much success, and of whole runs. Steps are the environment's: a decision

@@ -3,8 +3,8 @@
 Suites ``nominal`` and ``far``, and random starts 0.5 to 18 m away in all directions with any
 heading. Times are told as multiples of straight flight, the distance at full speed.
 
-    python benchmarks/from_everywhere.py
-    python benchmarks/from_everywhere.py --starts 100 --filters none
+    python benchmarks/control/from_everywhere.py
+    python benchmarks/control/from_everywhere.py --starts 100 --filters none
 """
 
 from __future__ import annotations

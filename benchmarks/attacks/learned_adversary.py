@@ -1,6 +1,6 @@
 """Trains an adversary, PPO rewarded for swing, through a safety filter, and lets it play.
 
-python benchmarks/learned_adversary.py --filter storage --steps 1000000
+python benchmarks/attacks/learned_adversary.py --filter storage --steps 1000000
 """
 
 from __future__ import annotations

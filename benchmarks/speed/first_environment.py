@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--against", type=Path, help="another checkout")
     arguments = parser.parse_args()
-    here = Path(__file__).resolve().parents[1]
+    here = Path(__file__).resolve().parents[2]
     checkouts = [here] if arguments.against is None else [arguments.against.resolve(), here]
     for _ in range(arguments.rounds):
         for checkout in checkouts:

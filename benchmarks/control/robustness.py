@@ -5,8 +5,8 @@ condition: the paper's controller as tuned, then the outer loop of ``field`` wit
 measured force inside, without and with the observer, and an agent. The second one goes on until
 less than 95 % arrive.
 
-    python benchmarks/robustness.py
-    python benchmarks/robustness.py --starts 48 --only limits
+    python benchmarks/control/robustness.py
+    python benchmarks/control/robustness.py --starts 48 --only limits
 """
 
 from __future__ import annotations
