@@ -46,9 +46,7 @@ def make_training_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> V
 def make_evaluation_env(config: TrainConfig, hyperparameters: dict[str, Any]) -> VecNormalize:
     """Return an environment of its own, normalized as the training's is at each evaluation."""
     count = min(config.evaluation_episodes, _EVALUATION_BATCH)
-    env = VecNormalize(_sb3_env(config, hyperparameters, count), training=False, norm_reward=False)
-    env.seed(VALIDATION_SEED)
-    return env
+    return VecNormalize(_sb3_env(config, hyperparameters, count), training=False, norm_reward=False)
 
 
 def _sb3_env(config: TrainConfig, hyperparameters: dict[str, Any], num_envs: int) -> Sb3VecEnv:

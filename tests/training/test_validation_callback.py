@@ -2,8 +2,11 @@
 
 import gymnasium
 import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback, EveryNTimesteps
 
 from defmanip_gym.baselines.residual_action import ResidualVectorAction
+from defmanip_gym.envs.registration import ROBUST_ENV_ID
 from defmanip_gym.training.sb3_vec_env import Sb3VecEnv
 from defmanip_gym.training.validation_callback import ValidationCallback
 
@@ -47,3 +50,34 @@ def test_a_checkpoint_keeps_the_best_score(callback):
     callback.best_score = 0.0
     callback.set_state(state)
     assert callback.best_score == 0.6
+
+
+def test_every_evaluation_has_the_same_starts_so_that_their_scores_compare():
+    train, validate = (
+        Sb3VecEnv(
+            gymnasium.make_vec(
+                f"defmanip_gym:{ROBUST_ENV_ID}", num_envs=2, autoreset_mode="SameStep"
+            )
+        )
+        for _ in range(2)
+    )
+    returns = []
+    callback = ValidationCallback(validate, episodes=2, interval=8, on_best=lambda: None)
+    watch = EveryNTimesteps(16, Told(lambda: returns.append(callback.last_mean_reward)))
+    model = PPO("MlpPolicy", train, learning_rate=0.0, n_steps=8, batch_size=16, n_epochs=1, seed=0)
+    model.learn(48, callback=[callback, watch])
+    assert len(returns) == 3 and len(set(returns)) == 1
+    train.close()
+    validate.close()
+
+
+class Told(BaseCallback):
+    """Calls a function."""
+
+    def __init__(self, tell):
+        super().__init__()
+        self.tell = tell
+
+    def _on_step(self):
+        self.tell()
+        return True
