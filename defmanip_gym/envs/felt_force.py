@@ -60,7 +60,8 @@ class FeltForce:
 
     def begin(self, ids: Ids, force_b: Array, swing: Array) -> None:
         """Weigh the objects of episodes that begin at rest; arguments as for ``Felt.at_rest``."""
-        for own, new in zip(self._felt, Felt.at_rest(force_b[ids], swing[ids]), strict=True):
+        hanging = swing[ids] if self._loop.is_hinged else np.zeros((len(ids), 1))
+        for own, new in zip(self._felt, Felt.at_rest(force_b[ids], hanging), strict=True):
             own[ids] = new
 
     def note(self, before: PlantState, plant: PlantState, force_b: Array) -> None:
@@ -101,7 +102,7 @@ def _add(loop: LoopConstants, actions: Array, plant: PlantState, felt: Felt, for
             w_up,
             upper,
             fore,
-            plant.swing[i, 0],
+            plant.swing[i, 0] if loop.is_hinged else 0.0,
             felt.force_b,
             felt.acceleration_b,
             felt.mass_kg,

@@ -24,6 +24,7 @@ class LoopConstants(NamedTuple):
     max_speed_m_s: float
     period_s: float
     arm: ArmLengths
+    is_hinged: bool
 
 
 @compilable

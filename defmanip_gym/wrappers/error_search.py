@@ -24,7 +24,8 @@ from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import GRAVITY_M_S2, BeamRanges
+from defmanip_gym.params import GRAVITY_M_S2
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
@@ -81,9 +82,7 @@ def worst_cases(config: TransportConfig) -> Iterator[TransportConfig]:
     for beam, disturbance in product(beams, disturbances):
         yield replace(
             config,
-            beam=beam,
-            nominal_beam=config.believed_beam,
-            beam_ranges=BeamRanges(),
+            payload=RodPayload(beam=beam, nominal_beam=config.believed_beam),
             disturbance=disturbance,
             disturbance_ranges=DisturbanceRanges(),
         )
@@ -118,7 +117,7 @@ class ErrorSearch:
         self._layout = ObservationLayout(config.beam.segment_count)
         self._simulation = Simulation(
             config.robot,
-            config.beam,
+            config.payload.body(),
             count=count,
             goal_position_m=config.goal_position_m,
             physics_period_s=config.task.physics_period_s,
