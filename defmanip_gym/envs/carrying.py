@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import PayloadError
 from defmanip_gym.params import GRAVITY_M_S2
-from defmanip_gym.theory.dynamics.measured_force import ROD_SHARE, MeasuredForceLinearization
+from defmanip_gym.theory.dynamics.measured_force import MeasuredForceLinearization
 from defmanip_gym.theory.dynamics.redundancy import RedundancyResolution
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
 from defmanip_gym.theory.dynamics.task_space import task_inertia
@@ -41,7 +41,7 @@ def _require_strength(config: TransportConfig) -> None:
     count = len(joints)
     nothing = np.zeros((count, 3))
     weight = nothing.copy()
-    mass_kg = float(config.payload.linear.m_o11[0, 0])
+    mass_kg = config.payload.mass_kg
     weight[:, 2] = mass_kg * GRAVITY_M_S2
     linearization = MeasuredForceLinearization(
         robot, RedundancyResolution(robot, goal_reach_m=config.goal_reach_and_height_m[0])
@@ -66,7 +66,7 @@ def _require_stability(config: TransportConfig) -> None:
     """Look at what is left of an error of acceleration after a sample (docs/derivations.md)."""
     linear = config.payload.linear
     apparent = linear.m_o11 - linear.m_o12 @ np.linalg.solve(linear.m_o22, linear.m_o12.T)
-    weighed = linear.m_o11[0, 0] * np.diag((ROD_SHARE, 1.0, 1.0))
+    weighed = np.diag(config.payload.mass_kg * np.array(config.payload.inertia_shares))
     pitch = _arms(config) @ JOINT_TO_PITCH.T
     inertia = task_inertia(config.believed_robot, pitch)
     left = np.linalg.solve(inertia + apparent, np.broadcast_to(apparent - weighed, inertia.shape))

@@ -11,7 +11,11 @@ from defmanip_gym.compiled import compiled, machine_code
 from defmanip_gym.envs.task_command import LoopConstants, plant_grasp_velocity, task_command
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.dynamics.frames import turned
-from defmanip_gym.theory.dynamics.measured_force import add_grasp_force_at, weighed_mass
+from defmanip_gym.theory.dynamics.measured_force import (
+    add_force_at,
+    add_grasp_force_at,
+    weighed_mass,
+)
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
@@ -95,20 +99,33 @@ def _add(loop: LoopConstants, actions: Array, plant: PlantState, felt: Felt, for
         upper = plant.joints[i, 0] + half * plant.joint_rates[i, 0]
         fore = upper + (plant.joints[i, 1] + half * plant.joint_rates[i, 1])
         w_forward, w_left, w_up = task_command(loop, actions, plant, i)
-        add_grasp_force_at(
-            loop.model.arm,
-            w_forward,
-            w_left,
-            w_up,
-            upper,
-            fore,
-            plant.swing[i, 0] if loop.is_hinged else 0.0,
-            felt.force_b,
-            felt.acceleration_b,
-            felt.mass_kg,
-            forces,
-            i,
-        )
+        if loop.is_hinged:
+            add_grasp_force_at(
+                loop.model.arm,
+                w_forward,
+                w_left,
+                w_up,
+                upper,
+                fore,
+                plant.swing[i, 0],
+                felt.force_b,
+                felt.acceleration_b,
+                felt.mass_kg,
+                forces,
+                i,
+            )
+        else:
+            mass, late = felt.mass_kg[i], felt.acceleration_b
+            add_force_at(
+                loop.model.arm,
+                felt.force_b[i, 0] + mass * loop.shares.forward * (w_forward - late[i, 0]),
+                felt.force_b[i, 1] + mass * loop.shares.left * (w_left - late[i, 1]),
+                felt.force_b[i, 2] + mass * loop.shares.up * (w_up - late[i, 2]),
+                upper,
+                fore,
+                forces,
+                i,
+            )
 
 
 @compiled

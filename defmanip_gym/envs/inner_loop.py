@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import compilable, compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.felt_force import Felt, FeltForce
-from defmanip_gym.envs.task_command import LoopConstants, task_command
+from defmanip_gym.envs.task_command import InertiaShares, LoopConstants, task_command
 from defmanip_gym.errors import ActionError
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.dynamics.feedback_linearization import (
@@ -56,6 +56,7 @@ class InnerLoop:
             period_s=task.control_period_s,
             arm=ArmLengths.of(config.robot),
             is_hinged=config.payload.is_hinged,
+            shares=InertiaShares(*config.payload.inertia_shares),
         )
         actions = np.empty(self._shape)
         segments = config.payload.count

@@ -16,6 +16,14 @@ from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
 Array = NDArray[np.float64]
 
 
+class InertiaShares(NamedTuple):
+    """Which shares of an object's mass its grasp accelerates forward, to the left and upwards."""
+
+    forward: float
+    left: float
+    up: float
+
+
 class LoopConstants(NamedTuple):
     """What the loop in task mode depends on (compiled code takes named tuples)."""
 
@@ -25,6 +33,7 @@ class LoopConstants(NamedTuple):
     period_s: float
     arm: ArmLengths
     is_hinged: bool
+    shares: InertiaShares
 
 
 @compilable

@@ -20,6 +20,7 @@ from defmanip_gym.payloads.mjcf_cargo import MjcfCargo
 from defmanip_gym.payloads.payload import Coordinate, Payload
 from defmanip_gym.plant.held_object import HeldObject
 from defmanip_gym.plant.simulation import Simulation
+from defmanip_gym.theory.payload.linkage import Linkage
 from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 Array = NDArray[np.float64]
@@ -78,6 +79,30 @@ class MjcfPayload(Payload):
     def linear(self) -> LinearizedObject:
         """Of the file's object."""
         return self.thing.linear
+
+    @property
+    def mass_kg(self) -> float:
+        """Of the whole object."""
+        return self.thing.object_file.mass_kg
+
+    @property
+    def carried(self) -> tuple[Linkage]:
+        """The object as links.
+
+        Raises:
+            ObjectFileError: it has springs that links do not.
+        """
+        return (self.linkage,)
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """The same."""
+        return self.thing.linkage()
+
+    @property
+    def extremes(self) -> tuple[MjcfPayload]:
+        """It alone."""
+        return (self,)
 
     @property
     def slowest_rad_s(self) -> float:

@@ -94,8 +94,32 @@ class Payload(ABC):
 
     @property
     @abstractmethod
+    def mass_kg(self) -> float:
+        """Mass of all of it, as everybody believes it."""
+
+    @property
+    @abstractmethod
+    def carried(self) -> tuple[object, ...]:
+        """What a filter has to cover: all that episodes may carry, or the ends of its ranges."""
+
+    @property
+    @abstractmethod
+    def extremes(self) -> tuple[Payload, ...]:
+        """The payloads at the ends of what episodes draw, each known exactly."""
+
+    @property
+    @abstractmethod
     def slowest_rad_s(self) -> float:
         """Angular frequency of the slowest small motion about the equilibrium."""
+
+    @property
+    def inertia_shares(self) -> tuple[float, float, float]:
+        """Diagonal of m̃_o11 over the mass: forward, left, up. What it weighs does not matter."""
+        linear = self.linear
+        follows = np.linalg.solve(linear.m_o22, linear.m_o12.T)
+        shown = np.diag(linear.m_o11 - linear.m_o12 @ follows) / linear.m_o11[0, 0]
+        forward, left, up = shown.tolist()
+        return forward, left, up
 
     @property
     @abstractmethod

@@ -16,6 +16,7 @@ from defmanip_gym.payloads.payload import Coordinate, Payload
 from defmanip_gym.payloads.rod_cargo import RodCargo
 from defmanip_gym.plant.rod_body import RodBody
 from defmanip_gym.plant.simulation import Simulation
+from defmanip_gym.theory.dynamics.measured_force import ROD_SHARE
 from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject, linearize
 from defmanip_gym.validation import plain, require_params, settle
 
@@ -79,9 +80,32 @@ class RodPayload(Payload):
         return linearize(self.beam)
 
     @property
+    def mass_kg(self) -> float:
+        """Of the given beam."""
+        return self.beam.mass_kg
+
+    @property
+    def carried(self) -> tuple[BeamParams, ...]:
+        """The beams at the ends of the ranges."""
+        return self.beam_ranges.extremes(self.beam)
+
+    @property
+    def extremes(self) -> tuple[RodPayload, ...]:
+        """Each of these beams, believed to be what they are all believed to be."""
+        return tuple(
+            RodPayload(beam=beam, nominal_beam=self.believed)
+            for beam in dict.fromkeys(self.carried)
+        )
+
+    @property
     def slowest_rad_s(self) -> float:
         """√(3 g / 2 l), a stiff rod's."""
         return math.sqrt(1.5 * GRAVITY_M_S2 / self.beam.length_m)
+
+    @property
+    def inertia_shares(self) -> tuple[float, float, float]:
+        """As of one uniform rod, however many segments there are."""
+        return ROD_SHARE, 1.0, 1.0
 
     @property
     def believed(self) -> BeamParams:

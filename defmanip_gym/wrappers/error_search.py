@@ -25,7 +25,6 @@ from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import GRAVITY_M_S2
-from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
@@ -65,7 +64,7 @@ class PeriodErrors(NamedTuple):
 
 def require_affordable(config: TransportConfig) -> None:
     """Raise CertificateError where the search would take too long."""
-    work = config.beam.segment_count * config.task.substeps
+    work = config.payload.count * config.task.substeps
     if work > _MOST_WORK:
         raise CertificateError(
             "segments times physics steps in a control period",
@@ -76,13 +75,13 @@ def require_affordable(config: TransportConfig) -> None:
 
 
 def worst_cases(config: TransportConfig) -> Iterator[TransportConfig]:
-    """Yield an environment with each of its extreme beams, disturbed the most."""
-    beams = dict.fromkeys(config.beam_ranges.extremes(config.beam))
+    """Yield an environment with each of its extreme payloads, disturbed the most."""
+    payloads = config.payload.extremes
     disturbances = config.disturbance_ranges.worst(config.disturbance, config.task.control_period_s)
-    for beam, disturbance in product(beams, disturbances):
+    for payload, disturbance in product(payloads, disturbances):
         yield replace(
             config,
-            payload=RodPayload(beam=beam, nominal_beam=config.believed_beam),
+            payload=payload,
             disturbance=disturbance,
             disturbance_ranges=DisturbanceRanges(),
         )
@@ -92,7 +91,7 @@ class ErrorSearch:
     """Some of the robots start from rest, the others are on their way.
 
     Args:
-        config: the environment's definition, with the beam that is carried.
+        config: the environment's definition, with what is carried.
         safety_filter: that is enforced.
         resting: motions of robots at rest.
         moving: and of robots on their way.
@@ -114,7 +113,7 @@ class ErrorSearch:
     ) -> None:
         count = len(resting.joints) + len(moving.joints)
         self._config, self._count, self._rng = config, count, rng
-        self._layout = ObservationLayout(config.beam.segment_count)
+        self._layout = ObservationLayout(config.payload.count)
         self._simulation = Simulation(
             config.robot,
             config.payload.body(),
@@ -192,7 +191,7 @@ class ErrorSearch:
         """Let sensors read what holding the object still would take, and then what that causes."""
         everybody, simulation = np.arange(self._count), self._simulation
         weight = np.zeros((self._count, 3))
-        weight[:, 2] = self._config.beam.mass_kg * GRAVITY_M_S2
+        weight[:, 2] = self._config.payload.mass_kg * GRAVITY_M_S2
         self._inner_loop.begin(everybody, self._as_read(weight), np.zeros((self._count, 1)))
         forces, plant = np.zeros_like(simulation.generalized_forces), simulation.read()
         self._inner_loop.write_forces(np.zeros((self._count, 3)), plant, forces)

@@ -132,6 +132,7 @@ class FieldController(SampledLaw):
             observer_gain=params.observer_gain_per_s,
             following_rate=params.following_rate,
             period_s=self.task.control_period_s,
+            inertia_shares=self.payload.inertia_shares,
         )
 
     def _check_gains(self) -> None:
