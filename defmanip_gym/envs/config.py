@@ -17,11 +17,12 @@ from defmanip_gym.params import (
     RobotParams,
     validated_sigma,
 )
+from defmanip_gym.payloads.choice import require_payload
 from defmanip_gym.payloads.payload import Payload
 from defmanip_gym.payloads.rod import RodPayload, rod_of
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
-from defmanip_gym.validation import require_choice, require_instance, require_params, settle
+from defmanip_gym.validation import require_choice, require_params, settle
 
 ControlMode = Literal["task", "force"]
 ConstraintMode = Literal["terminate", "penalty", "cost"]
@@ -72,7 +73,7 @@ class TransportConfig:
                 f"|φ| <= σ = {self.sigma_rad:.4g} rad at every sampled start",
                 "Narrow its spread or raise sigma_rad.",
             )
-        require_instance("payload", self.payload, Payload)
+        object.__setattr__(self, "payload", require_payload("payload", self.payload))
         if self.payload.believed is None and self.inner_loop == "model":
             raise ParameterError(
                 "inner_loop",

@@ -23,7 +23,7 @@ def payload_of(
     """Return the payload, a rod of the other arguments if it is None.
 
     Args:
-        payload: or the fields of a ``MjcfPayload``, as the JSON of a specification holds them.
+        payload: or its fields, as the JSON of a specification holds them.
         beam: true beam.
         beam_ranges: what each episode draws of it.
         nominal_beam: what a feedback linearization believes.
@@ -40,10 +40,20 @@ def payload_of(
             "the default beside a payload: beam, beam_ranges and nominal_beam make a rod",
             "Pass either a payload or a beam.",
         )
-    if isinstance(payload, Mapping):
-        return require_params("payload", payload, MjcfPayload)
-    if not isinstance(payload, Payload):
+    return require_payload("payload", payload)
+
+
+def require_payload(name: str, value: object) -> Payload:
+    """Return a payload, or the one whose fields a mapping holds: with a path, from a file.
+
+    Raises:
+        ParameterError: neither of them.
+    """
+    if isinstance(value, Mapping):
+        kind = MjcfPayload if "path" in value else RodPayload
+        return require_params(name, value, kind)
+    if not isinstance(value, Payload):
         raise ParameterError(
-            "payload", payload, "a Payload or None", "As in MjcfPayload(path=..., grasp_site=...)."
+            name, value, "a Payload or its fields", "As in MjcfPayload(path=..., grasp_site=...)."
         )
-    return payload
+    return value

@@ -184,7 +184,7 @@ def test_what_a_payload_excludes_is_said():
         DeformTransportEnv(payload=hose)
     with pytest.raises(ParameterError, match="either"):
         DeformTransportEnv(payload=hose, beam=BeamParams(mass_kg=1.0), **FELT)
-    with pytest.raises(ParameterError, match="Payload"):
+    with pytest.raises(ParameterError, match="MjcfPayload"):
         DeformTransportEnv(payload="hose.xml", **FELT)
     with pytest.raises(PayloadError, match="rod"):
         make_lqr(DeformTransportEnv(payload=hose, **FELT).config)

@@ -26,12 +26,7 @@ from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.observed_loop import ObservedLoop
 from defmanip_gym.theory.control.swing_following import SwingFollowing
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
-from defmanip_gym.validation import (
-    require_non_negative,
-    require_params,
-    require_positive,
-    settle,
-)
+from defmanip_gym.validation import require_non_negative, require_params, require_positive, settle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,8 +91,7 @@ class FieldController(SampledLaw):
         params: FieldParams | None = None,
     ) -> None:
         params = FieldParams() if params is None else require_params("params", params, FieldParams)
-        payload = RodPayload() if payload is None else payload
-        super().__init__(payload=payload, robot=robot, task=task, params=params)
+        super().__init__(payload=payload or RodPayload(), robot=robot, task=task, params=params)
         self.field = params.way.field(self.task, self.goal_reach_m)
         self._check_gains()
         bound = min(params.acceleration_bound, self.task.max_acceleration_m_s2)
