@@ -86,6 +86,10 @@ class ObjectFileError(InvalidValueError):
     """A model file that cannot be read, or is not an object that certificates are made for."""
 
 
+class PayloadError(InvalidValueError):
+    """A payload that cannot be carried, or that something is not known for."""
+
+
 class CertificateError(InvalidValueError):
     """A certificate that does not exist for this object, or does not fit this environment."""
 

@@ -1,5 +1,6 @@
-"""Make the picture of the README: ``python docs/make_images.py`` writes docs/images/."""
+"""Make README's and payloads' pictures: ``python docs/make_images.py`` writes docs/images/."""
 
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering.renderer import TransportRenderer
 from defmanip_gym.envs.rendering.view_params import ViewParams
+from defmanip_gym.payloads.mjcf import MjcfPayload
 
 FOLDER = Path(__file__).parent / "images"
 
@@ -39,6 +41,27 @@ def strip() -> Image.Image:
     return Image.fromarray(np.concatenate(frames, axis=1))
 
 
+def payloads() -> Image.Image:
+    """Return the objects of the examples, accelerated for 0.7 s."""
+    frames = []
+    for name in ("hose", "spherical", "bucket"):
+        path = files("defmanip_gym.objects") / "examples" / f"{name}.xml"
+        config = TransportConfig(
+            constraint_mode="cost",
+            inner_loop="measured_force",
+            payload=MjcfPayload(path=str(path)),
+        )
+        engine = TransportEngine(config, num_envs=1)
+        renderer = TransportRenderer(engine, ViewParams(width=480, height=420, camera_name="side"))
+        engine.reset(options={"start": "paper"})
+        for _ in range(35):
+            engine.step(np.array([[0.9, 0.2, 0.0]]))
+        frames.append(renderer.render("rgb_array"))
+        renderer.close()
+    return Image.fromarray(np.concatenate(frames, axis=1))
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     strip().save(FOLDER / "plant.png", optimize=True)
+    payloads().save(FOLDER / "payloads.png", optimize=True)

@@ -10,6 +10,7 @@ from defmanip_gym.envs.rendering.graphics import GRAPHICS
 from defmanip_gym.envs.rendering.opengl import open_context
 from defmanip_gym.errors import RenderingError
 from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.plant.rod_body import RodBody
 from defmanip_gym.plant.simulation import Simulation
 
 settings.register_profile("repeatable", deadline=None, max_examples=40, derandomize=True)
@@ -42,7 +43,7 @@ def make_plant():
         beam = beam or BeamParams()
         simulation = Simulation(
             robot or RobotParams(),
-            beam,
+            RodBody(beam),
             count=count,
             goal_position_m=(0.0, 0.0, 1.0),
             physics_period_s=physics_period_s,

@@ -19,7 +19,7 @@ from defmanip_gym.compiled import (
     compiled_sources,
     sources_stamp,
 )
-from defmanip_gym.plant.plant_state import read_state
+from defmanip_gym.plant.rod_body import read_rod
 
 EPISODE = """
 import gymnasium, numpy as np
@@ -197,7 +197,7 @@ def test_a_killed_process_leaves_no_machine_code_of_other_sources():
 
 def test_machine_code_on_disk_is_dated_by_all_compiled_sources():
     package = Path(defmanip_gym.__file__).parent
-    assert read_state._cache._cache_file._source_stamp == sources_stamp(package)
+    assert read_rod._cache._cache_file._source_stamp == sources_stamp(package)
 
 
 def numbers(mode, before="", **environment):

@@ -15,11 +15,11 @@ PACKAGE = Path(defmanip_gym.__file__).parent
 # lower layers first; a module imports from its own layer or below
 LAYERS = [
     {"errors", "version", "files", "display", "workers", "compiled", "compiler", "lowering"},
-    {"validation"},
+    {"validation", "state_tree"},
     {"params", "task_params", "observation", "disturbance_ranges"},
     {"theory", "plant"},
     {"objects", "planning"},
-    {"attack"},
+    {"attack", "payloads"},
     {"envs"},
     {"wrappers"},
     {"baselines"},

@@ -43,7 +43,7 @@ def filter_remarks(ladder: Ladder) -> list[str]:
     )
     told.append(
         "Of an object from a file V_σ is the lowest pass that a search found: the promise is one "
-        "for that; no environment carries such an object yet."
+        "for that; in an environment payload_filter_for makes room for its errors."
         if ladder.beam is None
         else "The level leaves room for the default robot's errors; "
         "filter_for(env.unwrapped.config) makes it for another."

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from dataclasses import asdict, dataclass, field, is_dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from defmanip_gym.params import (
     RobotParams,
     validated_sigma,
 )
+from defmanip_gym.payloads.choice import require_payload
+from defmanip_gym.payloads.payload import Payload
+from defmanip_gym.payloads.rod import RodPayload, rod_of
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, ArmKinematics
 from defmanip_gym.validation import require_choice, require_params, settle
@@ -31,12 +34,11 @@ class TransportConfig:
     """Arguments of the environment; see its documentation.
 
     Parameters may also be mappings of their fields, as the JSON of a Gymnasium specification holds
-    them; those that a mapping leaves out are as by default. ``robot`` and ``beam`` are true, the
-    beam but for what ``beam_ranges`` vary; ``nominal_robot`` and ``nominal_beam`` are what the
-    built-in feedback linearization believes. By default it believes the truth, except that it
-    counts on no damping at the root: overestimated damping destabilizes the swing.
+    them; those that a mapping leaves out are as by default. ``robot`` and ``payload`` are true;
+    ``nominal_robot`` and the payload's ``believed`` are what the built-in feedback linearization
+    believes. By default it believes the truth, except that it counts on no damping at the root.
     ``inner_loop="measured_force"`` takes the grasp force as the sensor reads it, noise included, in
-    the place of any belief about the beam.
+    the place of any belief about the payload.
     """
 
     control_mode: ControlMode = "task"
@@ -44,10 +46,8 @@ class TransportConfig:
     constraint_mode: ConstraintMode = "terminate"
     sigma_rad: float = math.pi / 6
     robot: RobotParams = field(default_factory=RobotParams)
-    beam: BeamParams = field(default_factory=BeamParams)
-    beam_ranges: BeamRanges = field(default_factory=BeamRanges)
+    payload: Payload = field(default_factory=RodPayload)
     nominal_robot: RobotParams | None = None
-    nominal_beam: BeamParams | None = None
     task: TaskParams = field(default_factory=TaskParams)
     disturbance: DisturbanceParams = field(default_factory=DisturbanceParams)
     disturbance_ranges: DisturbanceRanges = field(default_factory=DisturbanceRanges)
@@ -55,10 +55,7 @@ class TransportConfig:
     def __post_init__(self) -> None:
         for name, kind, optional in (
             ("robot", RobotParams, False),
-            ("beam", BeamParams, False),
-            ("beam_ranges", BeamRanges, False),
             ("nominal_robot", RobotParams, True),
-            ("nominal_beam", BeamParams, True),
             ("task", TaskParams, False),
             ("disturbance", DisturbanceParams, False),
             ("disturbance_ranges", DisturbanceRanges, False),
@@ -76,14 +73,13 @@ class TransportConfig:
                 f"|φ| <= σ = {self.sigma_rad:.4g} rad at every sampled start",
                 "Narrow its spread or raise sigma_rad.",
             )
-        self.beam_ranges.require_fit(self.beam)
-        nominal = self.nominal_beam
-        if nominal is not None and nominal.segment_count != self.beam.segment_count:
+        object.__setattr__(self, "payload", require_payload("payload", self.payload))
+        if self.payload.believed is None and self.inner_loop == "model":
             raise ParameterError(
-                "nominal_beam.segment_count",
-                nominal.segment_count,
-                f"{self.beam.segment_count}, the true beam's",
-                "The controller observes one angle per true segment.",
+                "inner_loop",
+                self.inner_loop,
+                "'measured_force' for a payload of which there is no rod to believe in",
+                "Pass inner_loop='measured_force'.",
             )
 
     @property
@@ -97,11 +93,44 @@ class TransportConfig:
         return self.nominal_robot or self.robot
 
     @property
+    def identity(self) -> dict[str, Any]:
+        """All of it, as records of episodes identify their environment."""
+        fields_ = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        del fields_["payload"]
+        told = {
+            name: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+            for name, value in fields_.items()
+        }
+        return told | self.payload.identity
+
+    @property
+    def rod(self) -> RodPayload:
+        """The payload, for what knows rods only.
+
+        Raises:
+            PayloadError: it is another one.
+        """
+        return rod_of(self.payload)
+
+    @property
+    def beam(self) -> BeamParams:
+        """The true beam, but for what ``beam_ranges`` vary."""
+        return self.rod.beam
+
+    @property
+    def beam_ranges(self) -> BeamRanges:
+        """What each episode draws of it."""
+        return self.rod.beam_ranges
+
+    @property
+    def nominal_beam(self) -> BeamParams | None:
+        """The beam of the feedback linearization, if it is not the true one."""
+        return self.rod.nominal_beam
+
+    @property
     def believed_beam(self) -> BeamParams:
         """Beam parameters of the feedback linearization."""
-        if self.nominal_beam is not None:
-            return self.nominal_beam
-        return replace(self.beam, damping=0.0)
+        return self.rod.believed
 
     @property
     def goal_reach_and_height_m(self) -> tuple[float, float]:

@@ -21,6 +21,8 @@ from defmanip_gym.envs.rendering.renderer import TransportRenderer
 from defmanip_gym.envs.rendering.stage import Image
 from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
+from defmanip_gym.payloads.choice import payload_of
+from defmanip_gym.payloads.payload import Payload
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_choice, require_seed
 
@@ -140,6 +142,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | beam_ranges     | none (`BeamRanges()`) | damping, mass, length to draw each episode from   |
     | nominal_robot   | `None`           | robot of the feedback linearization; the true one      |
     | nominal_beam    | `None`           | its beam; `beam` with no damping at the root           |
+    | payload         | `None`           | what is carried instead of a beam: `MjcfPayload(...)`   |
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
     | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
     | disturbance_ranges | none (`DisturbanceRanges()`) | of these, to draw each episode from |
@@ -174,6 +177,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
         beam_ranges: BeamRanges = BeamRanges(),
         nominal_robot: RobotParams | None = None,
         nominal_beam: BeamParams | None = None,
+        payload: Payload | Mapping[str, Any] | None = None,
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
         disturbance_ranges: DisturbanceRanges = DisturbanceRanges(),
@@ -196,10 +200,10 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
             robot=robot,
-            beam=beam,
-            beam_ranges=beam_ranges,
+            payload=payload_of(
+                payload, beam=beam, beam_ranges=beam_ranges, nominal_beam=nominal_beam
+            ),
             nominal_robot=nominal_robot,
-            nominal_beam=nominal_beam,
             task=task,
             disturbance=disturbance,
             disturbance_ranges=disturbance_ranges,

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.params import DisturbanceParams
+from defmanip_gym.state_tree import fitted
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]

@@ -14,7 +14,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from defmanip_gym.compiled import machine_code, without_garbage_collection
-from defmanip_gym.envs.carried_beams import VARIED, CarriedBeams
+from defmanip_gym.envs.carrying import require_carriable
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.disturbance import EpisodeDisturbances
 from defmanip_gym.envs.generators import EpisodeGenerators
@@ -22,7 +22,6 @@ from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.scores import FLAGS, MEASURES, Scores, score
 from defmanip_gym.envs.sensor_noise import SensorNoise
 from defmanip_gym.envs.starts import StartSampler, check_starts, extreme_starts, requested_starts
-from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.envs.survey import goal_of
 from defmanip_gym.envs.task import task_of
 from defmanip_gym.envs.workspace import workspace_of
@@ -30,6 +29,7 @@ from defmanip_gym.errors import StateError
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.plant.simulation import Simulation
+from defmanip_gym.state_tree import fitted
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -56,13 +56,14 @@ class TransportEngine:
         max_episode_steps: int | None = None,
     ) -> None:
         check_starts(extreme_starts(config.task.start, config.task.goal), config)
+        require_carriable(config)
         self.config, self.num_envs = config, num_envs
-        self.layout = ObservationLayout(config.beam.segment_count)
+        self.layout = ObservationLayout(config.payload.count)
         self._task, self._goal = task_of(config), goal_of(config)
         self._workspace = workspace_of(config)
         self.simulation = Simulation(
             config.robot,
-            config.beam,
+            config.payload.body(),
             count=num_envs,
             goal_position_m=config.goal_position_m,
             physics_period_s=config.task.physics_period_s,
@@ -77,11 +78,12 @@ class TransportEngine:
         self._all = np.arange(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._last_step = max_episode_steps or int(np.iinfo(np.int64).max)
-        self._beams = CarriedBeams(config, self.simulation, self.generators)
+        self._cargo = config.payload.cargo(self.simulation, self.generators)
+        self._info_keys = (*FLAGS, *MEASURES, "episode_cost", *self._cargo.told)
         self._is_started = False
         self._at_rest = np.zeros((num_envs, self.action_size)), np.zeros(num_envs, dtype=np.bool_)
         self._scores = Scores.empty(num_envs, self.layout.size)
-        self._plant = PlantState.empty(num_envs, config.beam.segment_count)
+        self._plant = PlantState.empty(num_envs, config.payload.count)
         self._plant_before = self._plant.copy()
         self._score = machine_code(
             score,
@@ -128,8 +130,8 @@ class TransportEngine:
         scores = self._scores
         # a copy: the next step adds to it
         costs = (scores.episode_costs.copy(),)
-        values = chain(scores.told_flags, scores.measures, costs, self._beams.values.copy())
-        return dict(zip(_INFO_KEYS, values, strict=True))
+        values = chain(scores.told_flags, scores.measures, costs, self._cargo.values.copy())
+        return dict(zip(self._info_keys, values, strict=True))
 
     @property
     def single_info(self) -> dict[str, Any]:
@@ -139,9 +141,9 @@ class TransportEngine:
             *scores.told_flags[:, 0].tolist(),
             *scores.measures[:, 0].tolist(),
             scores.episode_costs.item(),
-            *self._beams.values[:, 0].tolist(),
+            *self._cargo.values[:, 0].tolist(),
         )
-        return dict(zip(_INFO_KEYS, values, strict=True))
+        return dict(zip(self._info_keys, values, strict=True))
 
     def reset(
         self,
@@ -174,7 +176,7 @@ class TransportEngine:
         if seeds is not None:
             self._forget(self.generators.seed(ids.tolist(), seeds))
         starts = self._starts.sample(ids) if requested is None else requested[ids]
-        self._beams.draw(ids)
+        self._cargo.draw(ids)
         self._disturbances.draw(ids)
         self._place(ids, starts)
         self._steps[ids] = 0
@@ -205,7 +207,7 @@ class TransportEngine:
             "generators": self.generators.get_state(),
             "starts": self._starts.get_state(),
             "noise": self._noise.get_state(),
-            "beams": self._beams.get_state(),
+            "beams": self._cargo.get_state(),
             "disturbances": self._disturbances.get_state(),
             "simulation": self.simulation.get_state(),
             "plant": self._plant.copy()._asdict(),
@@ -227,10 +229,10 @@ class TransportEngine:
         if not isinstance(state["is_started"], bool):
             raise StateError("state['is_started']", state["is_started"], "a bool", "See get_state.")
         starts = self._starts.fitting(state["starts"])
-        beams, noise = self._beams.fitting(state["beams"]), self._noise.fitting(state["noise"])
+        cargo, noise = self._cargo.fitting(state["beams"]), self._noise.fitting(state["noise"])
         disturbances = self._disturbances.fitting(state["disturbances"])
         self.generators.set_state(state["generators"])
-        self._beams.set_state(beams)
+        self._cargo.set_state(cargo)
         self._disturbances.set_state(disturbances)
         self._starts.set_state(starts)
         self._noise.set_state(noise)
@@ -316,14 +318,6 @@ class TransportEngine:
         So the first force reading needs no forward pass, which for a handful of episodes costs as
         much as a tenth of a step of hundreds.
         """
-        swing = np.repeat(starts[:, 5:], self.config.beam.segment_count, axis=1)
+        swing = self.config.payload.swung(starts[:, 5])
         self.simulation.place(ids, starts[:, :3], starts[:, 3:5], swing)
-        self.simulation.report(ids, self._beams.forces_at_rest(ids, swing))
-
-
-_INFO_KEYS = (
-    *FLAGS,
-    *MEASURES,
-    "episode_cost",
-    *(f"beam_{name}" for name in VARIED),
-)
+        self.simulation.report(ids, self._cargo.forces_at_rest(ids, swing))

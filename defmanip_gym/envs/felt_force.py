@@ -11,7 +11,11 @@ from defmanip_gym.compiled import compiled, machine_code
 from defmanip_gym.envs.task_command import LoopConstants, plant_grasp_velocity, task_command
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.dynamics.frames import turned
-from defmanip_gym.theory.dynamics.measured_force import add_grasp_force_at, weighed_mass
+from defmanip_gym.theory.dynamics.measured_force import (
+    add_force_at,
+    add_grasp_force_at,
+    weighed_mass,
+)
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
@@ -60,7 +64,8 @@ class FeltForce:
 
     def begin(self, ids: Ids, force_b: Array, swing: Array) -> None:
         """Weigh the objects of episodes that begin at rest; arguments as for ``Felt.at_rest``."""
-        for own, new in zip(self._felt, Felt.at_rest(force_b[ids], swing[ids]), strict=True):
+        hanging = swing[ids] if self._loop.is_hinged else np.zeros((len(ids), 1))
+        for own, new in zip(self._felt, Felt.at_rest(force_b[ids], hanging), strict=True):
             own[ids] = new
 
     def note(self, before: PlantState, plant: PlantState, force_b: Array) -> None:
@@ -94,20 +99,33 @@ def _add(loop: LoopConstants, actions: Array, plant: PlantState, felt: Felt, for
         upper = plant.joints[i, 0] + half * plant.joint_rates[i, 0]
         fore = upper + (plant.joints[i, 1] + half * plant.joint_rates[i, 1])
         w_forward, w_left, w_up = task_command(loop, actions, plant, i)
-        add_grasp_force_at(
-            loop.model.arm,
-            w_forward,
-            w_left,
-            w_up,
-            upper,
-            fore,
-            plant.swing[i, 0],
-            felt.force_b,
-            felt.acceleration_b,
-            felt.mass_kg,
-            forces,
-            i,
-        )
+        if loop.is_hinged:
+            add_grasp_force_at(
+                loop.model.arm,
+                w_forward,
+                w_left,
+                w_up,
+                upper,
+                fore,
+                plant.swing[i, 0],
+                felt.force_b,
+                felt.acceleration_b,
+                felt.mass_kg,
+                forces,
+                i,
+            )
+        else:
+            mass, late = felt.mass_kg[i], felt.acceleration_b
+            add_force_at(
+                loop.model.arm,
+                felt.force_b[i, 0] + mass * loop.shares.forward * (w_forward - late[i, 0]),
+                felt.force_b[i, 1] + mass * loop.shares.left * (w_left - late[i, 1]),
+                felt.force_b[i, 2] + mass * loop.shares.up * (w_up - late[i, 2]),
+                upper,
+                fore,
+                forces,
+                i,
+            )
 
 
 @compiled

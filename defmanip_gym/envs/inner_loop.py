@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import compilable, compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.felt_force import Felt, FeltForce
-from defmanip_gym.envs.task_command import LoopConstants, task_command
+from defmanip_gym.envs.task_command import InertiaShares, LoopConstants, task_command
 from defmanip_gym.errors import ActionError
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.dynamics.feedback_linearization import (
@@ -46,7 +46,7 @@ class InnerLoop:
         measures_force = config.inner_loop == "measured_force"
         linearization = FeedbackLinearization(
             config.believed_robot,
-            None if measures_force else config.believed_beam,
+            None if measures_force else config.payload.believed,
             RedundancyResolution(config.believed_robot, goal_reach_m=reach_m),
         )
         self._constants = LoopConstants(
@@ -55,9 +55,11 @@ class InnerLoop:
             max_speed_m_s=task.max_speed_m_s,
             period_s=task.control_period_s,
             arm=ArmLengths.of(config.robot),
+            is_hinged=config.payload.is_hinged,
+            shares=InertiaShares(*config.payload.inertia_shares),
         )
         actions = np.empty(self._shape)
-        segments = config.beam.segment_count
+        segments = config.payload.count
         self._state = StateRoom.empty(len(linearization.model.d_o22))
         plant = PlantState.empty(num_envs, segments)
         self._felt: FeltForce | None = None

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.disturbance import EpisodeDisturbances
-from defmanip_gym.envs.state_tree import fitted, require_drawn
 from defmanip_gym.errors import StateError
 from defmanip_gym.observation import ObservationLayout
+from defmanip_gym.state_tree import fitted, require_drawn
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.envs.state_tree import fitted, require_drawn
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.errors import StartError
+from defmanip_gym.state_tree import fitted, require_drawn
 from defmanip_gym.task_params import StartParams, TaskParams
 from defmanip_gym.validation import number_array
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from defmanip_gym.compiled import compilable
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.theory.control.time_to_go import Motion, Mover, time_to_go
 
 # What the expected time takes for granted: what ``field`` needs, which was tuned (docs/training.md)
@@ -121,7 +120,7 @@ def task_of(config: TransportConfig) -> Task:
         heading_tolerance_rad=task.heading_tolerance_rad,
         max_speed_m_s=task.max_speed_m_s,
         sigma_rad=config.sigma_rad,
-        swing_frequency_rad_s=math.sqrt(1.5 * GRAVITY_M_S2 / config.beam.length_m),
+        swing_frequency_rad_s=config.payload.slowest_rad_s,
         mover=_mover_of(config),
         violation_ends=config.constraint_mode == "terminate",
         excess_is_penalized=config.constraint_mode == "penalty",

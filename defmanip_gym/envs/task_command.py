@@ -16,6 +16,14 @@ from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
 Array = NDArray[np.float64]
 
 
+class InertiaShares(NamedTuple):
+    """Which shares of an object's mass its grasp accelerates forward, to the left and upwards."""
+
+    forward: float
+    left: float
+    up: float
+
+
 class LoopConstants(NamedTuple):
     """What the loop in task mode depends on (compiled code takes named tuples)."""
 
@@ -24,6 +32,8 @@ class LoopConstants(NamedTuple):
     max_speed_m_s: float
     period_s: float
     arm: ArmLengths
+    is_hinged: bool
+    shares: InertiaShares
 
 
 @compilable

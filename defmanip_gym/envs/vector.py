@@ -22,9 +22,11 @@ from defmanip_gym.envs.rendering.modes import IMAGE_MODES
 from defmanip_gym.envs.rendering.renderer import TransportRenderer
 from defmanip_gym.envs.rendering.stage import Image
 from defmanip_gym.envs.rendering.view_params import HEIGHT, WIDTH, FreeCameraParams, ViewParams
-from defmanip_gym.envs.state_tree import fitted
 from defmanip_gym.errors import StartError
 from defmanip_gym.params import BeamParams, BeamRanges, DisturbanceParams, RobotParams
+from defmanip_gym.payloads.choice import payload_of
+from defmanip_gym.payloads.payload import Payload
+from defmanip_gym.state_tree import fitted
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import (
     MOST_WORKERS,
@@ -72,6 +74,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         beam_ranges: see there; every episode of the batch draws its own beam.
         nominal_robot: see there.
         nominal_beam: see there.
+        payload: see there.
         task: see there.
         disturbance: see there.
         disturbance_ranges: see there; every episode of the batch draws its own.
@@ -105,6 +108,7 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
         beam_ranges: BeamRanges = BeamRanges(),
         nominal_robot: RobotParams | None = None,
         nominal_beam: BeamParams | None = None,
+        payload: Payload | Mapping[str, Any] | None = None,
         task: TaskParams = TaskParams(),
         disturbance: DisturbanceParams = DisturbanceParams(),
         disturbance_ranges: DisturbanceRanges = DisturbanceRanges(),
@@ -134,10 +138,10 @@ class DeformTransportVectorEnv(EpisodeAccess, gymnasium.vector.VectorEnv[Any, An
             constraint_mode=constraint_mode,
             sigma_rad=sigma_rad,
             robot=robot,
-            beam=beam,
-            beam_ranges=beam_ranges,
+            payload=payload_of(
+                payload, beam=beam, beam_ranges=beam_ranges, nominal_beam=nominal_beam
+            ),
             nominal_robot=nominal_robot,
-            nominal_beam=nominal_beam,
             task=task,
             disturbance=disturbance,
             disturbance_ranges=disturbance_ranges,

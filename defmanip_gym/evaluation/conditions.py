@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from defmanip_gym.envs.config import InnerLoopKind, TransportConfig
 from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams, DisturbanceParams
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.validation import require_number, require_params, require_positive, settle
 
@@ -73,9 +74,8 @@ class Condition:
         """The environment; exceeding σ is a cost there and does not end episodes."""
         return TransportConfig(
             constraint_mode="cost",
-            beam=self.beam,
             # as by default the inner loop counts on no damping, but here on no other truth either
-            nominal_beam=replace(NOMINAL_BEAM, damping=0.0),
+            payload=RodPayload(beam=self.beam, nominal_beam=replace(NOMINAL_BEAM, damping=0.0)),
             disturbance=self.disturbance,
         )
 

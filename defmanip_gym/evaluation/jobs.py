@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.evaluation.controllers import ControllerSpec
@@ -84,7 +84,7 @@ def job_fingerprint(
             "package_version": __version__,
             "horizon_s": suite.horizon_s,
             "environments": [
-                asdict(condition.environment_on(inner_loop)) for condition in suite.conditions
+                condition.environment_on(inner_loop).identity for condition in suite.conditions
             ],
             "scenarios": suite.digest,
             "controller": controller.identity,

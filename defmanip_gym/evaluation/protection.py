@@ -131,7 +131,8 @@ def _storage_filter(protection: StorageProtection, condition: Condition) -> Safe
             name: tuple(factor * getattr(NOMINAL_BEAM, name) for factor in ends)
             for name, ends in protection.factors.items()
         }
-        config = replace(config, beam=NOMINAL_BEAM, beam_ranges=BeamRanges(**ranges))
+        payload = replace(config.rod, beam=NOMINAL_BEAM, beam_ranges=BeamRanges(**ranges))
+        config = replace(config, payload=payload)
     return protection.filter_in(config, condition.delay_periods)
 
 

@@ -1,9 +1,9 @@
 """Robots of which only the motion is there, carrying objects on the rig.
 
-No environment carries objects from files yet. This is what one would do to an object, and what it
-would observe: the unicycle with its arm moves by redundancy resolution and speed limit, without
-forces, and the rig's carriage follows its grasp. Observations are those of ``ObservationLayout(N)``
-with z2 as ``swing``; goal, force and what else filters do not look at stay zero.
+What the environment does to an object and observes of it, without a robot's errors: the unicycle
+with its arm moves by redundancy resolution and speed limit, without forces, and the rig's carriage
+follows its grasp. Observations are those of ``ObservationLayout(N)`` with z2 as ``swing``; goal,
+force and what else filters do not look at stay zero.
 """
 
 from __future__ import annotations

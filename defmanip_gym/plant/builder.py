@@ -1,4 +1,4 @@
-"""The MuJoCo model of base, arm and beam, from parameters.
+"""The MuJoCo model of base, arm and what it carries, from parameters.
 
 Contacts are off: the task is about dynamics, and the paper's start lets the beam's tip pass 3 cm
 below the floor's plane.
@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import mujoco
 
-from defmanip_gym.params import GRAVITY_M_S2, BeamParams, LinkParams, RobotParams
+from defmanip_gym.params import GRAVITY_M_S2, LinkParams, RobotParams
 from defmanip_gym.plant import names
-from defmanip_gym.plant.beam_body import add_beam, add_pitch_hinge, set_inertia
+from defmanip_gym.plant.beam_body import add_pitch_hinge, set_inertia
+from defmanip_gym.plant.payload_body import PayloadBody
 from defmanip_gym.plant.scene import (
     ROBOT_COLOR,
     WHEEL_COLOR,
@@ -25,7 +26,7 @@ _NO_SLIP_GAIN = 1e6
 
 def build_model(
     robot: RobotParams,
-    beam: BeamParams,
+    body: PayloadBody,
     *,
     goal_position_m: tuple[float, float, float],
     physics_period_s: float,
@@ -34,7 +35,7 @@ def build_model(
 
     Args:
         robot: true robot parameters.
-        beam: true beam parameters.
+        body: what it truly carries.
         goal_position_m: where the goal marker stands, world frame.
         physics_period_s: integration step.
     """
@@ -51,7 +52,7 @@ def build_model(
         name=names.GRASP_SITE, pos=[robot.forearm.length_m, 0, 0], size=[0.03], rgba=ROBOT_COLOR
     )
     add_grasp_camera(forearm, robot.forearm.length_m)
-    _add_beam(spec, forearm, robot, beam)
+    _add_payload(spec, forearm, robot, body)
     _add_actuators(spec, robot)
     return spec.compile()
 
@@ -112,17 +113,11 @@ def _add_arm(base: mujoco.MjsBody, robot: RobotParams) -> mujoco.MjsBody:
     return forearm
 
 
-def _add_beam(
-    spec: mujoco.MjSpec, forearm: mujoco.MjsBody, robot: RobotParams, beam: BeamParams
+def _add_payload(
+    spec: mujoco.MjSpec, forearm: mujoco.MjsBody, robot: RobotParams, body: PayloadBody
 ) -> None:
-    root = add_beam(
-        spec,
-        forearm,
-        beam,
-        position_m=[robot.forearm.length_m, 0.0, 0.0],
-        pitch_joints=(names.SHOULDER, names.ELBOW),
-    )
-    site = root.add_site(name="beam_root", rgba=[0, 0, 0, 0])
+    held = body.attach(spec, forearm, robot)
+    site = held.add_site(name="beam_root", rgba=[0, 0, 0, 0])
     spec.add_sensor(
         name=names.GRASP_FORCE,
         type=mujoco.mjtSensor.mjSENS_FORCE,

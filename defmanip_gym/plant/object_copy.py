@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_PRIMITIVES = tuple(
+    getattr(mujoco.mjtGeom, f"mjGEOM_{kind}").value
+    for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
+)
+
 HELD_SITE = "object/held"  # where the gripper holds the object
 
 
@@ -23,7 +28,7 @@ def add_object(
     *,
     grasp_site: str,
     grasp_m: Array,
-) -> None:
+) -> list[mujoco.MjsBody]:
     """Hang an object from a carriage, in the orientation that it has in its world.
 
     Args:
@@ -32,6 +37,9 @@ def add_object(
         model: the object, compiled alone with its root held still; its joints are scalar.
         grasp_site: name of the site at which it is held.
         grasp_m: where that site is in the object's world, (3,).
+
+    Returns:
+        The carriage, and the object's bodies in the model's order.
     """
     bodies = [carriage]
     for index in range(1, model.nbody):
@@ -53,6 +61,40 @@ def add_object(
             name=sites[index], pos=model.site_pos[index], quat=model.site_quat[index]
         )
     _add_tendons(spec, bodies, model, sites)
+    return bodies
+
+
+def add_drawn_geoms(
+    spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], model: mujoco.MjModel
+) -> tuple[str, ...]:
+    """Draw what an object's file draws, meshes as the boxes around them, and return the names.
+
+    Args:
+        spec: the model that the object has been added to.
+        bodies: as ``add_object`` returns them.
+        model: the object, compiled alone.
+    """
+    added = []
+    for index in np.flatnonzero(model.geom_bodyid).tolist():
+        name = _name("geom", index)
+        if spec.geom(name) is None:
+            kind, size, offset = model.geom_type[index], model.geom_size[index], np.zeros(3)
+            if kind not in _PRIMITIVES:
+                kind, size = mujoco.mjtGeom.mjGEOM_BOX, model.geom_aabb[index, 3:]
+                offset = model.geom_aabb[index, :3]
+            turned = np.empty(3)
+            mujoco.mju_rotVecQuat(turned, offset, model.geom_quat[index])
+            bodies[model.geom_bodyid[index]].add_geom(
+                name=name,
+                type=mujoco.mjtGeom(kind),
+                size=size,
+                pos=model.geom_pos[index] + turned,
+                quat=model.geom_quat[index],
+                rgba=model.geom_rgba[index],
+                mass=0,
+            )
+        added.append(name)
+    return tuple(added)
 
 
 def _name(kind: str, index: int) -> str:

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defmanip_gym.compiled import compiled
+from defmanip_gym.compiled import compilable
 
 Array = NDArray[np.float64]
 
 
 class PlantState(NamedTuple):
-    """What the plant's sensors and encoders see; n simulations, N segments.
+    """What the plant's sensors and encoders see; n simulations, N internal coordinates.
 
     Attributes:
         base_pose: (x, y, θ), (n, 3) m, m, rad, world frame.
@@ -22,8 +22,8 @@ class PlantState(NamedTuple):
         lateral_speed: slip of the base to its left, (n,) m/s.
         joints: q_a, (n, 2) rad.
         joint_rates: q̇_a, (n, 2) rad/s.
-        swing: φ, (n, N) rad from the vertical.
-        swing_rate: φ̇, (n, N) rad/s.
+        swing: z2, (n, N): of rods φ in rad from the vertical.
+        swing_rate: ż2, (n, N).
         grasp_force_b: force on the object at the grasp, (n, 3) N, base frame.
     """
 
@@ -60,38 +60,16 @@ class PlantState(NamedTuple):
             values[failed] = last[failed]
 
 
-@compiled
-def read_state(
-    ids: NDArray[np.intp], position: Array, velocity: Array, force_s: Array, state: PlantState
-) -> None:
-    """Fill in the state for MuJoCo's qpos and qvel.
-
-    Args:
-        ids: the simulations to read.
-        position: x, y, θ and the hinges' relative angles, (n, 5 + N).
-        velocity: their rates, (n, 5 + N).
-        force_s: on the object at the grasp, (n, 3) N in the frame of the first segment.
-        state: to be filled in.
-    """
-    _, segments = state.swing.shape
-    for row in range(len(ids)):
-        i = ids[row]
-        heading = position[i, 2]
-        c, s = cos(heading), sin(heading)
-        for k in range(3):
-            state.base_pose[i, k] = position[i, k]
-        state.base_velocity[i, 0] = c * velocity[i, 0] + s * velocity[i, 1]
-        state.base_velocity[i, 1] = velocity[i, 2]
-        state.lateral_speed[i] = c * velocity[i, 1] - s * velocity[i, 0]
-        for k in range(2):
-            state.joints[i, k] = position[i, 3 + k]
-            state.joint_rates[i, k] = velocity[i, 3 + k]
-        pitch, pitch_rate = position[i, 3] + position[i, 4], velocity[i, 3] + velocity[i, 4]
-        for k in range(segments):
-            pitch, pitch_rate = pitch + position[i, 5 + k], pitch_rate + velocity[i, 5 + k]
-            state.swing[i, k], state.swing_rate[i, k] = pitch, pitch_rate
-        # the first segment's frame is the base's, pitched by its swing
-        c, s = cos(state.swing[i, 0]), sin(state.swing[i, 0])
-        state.grasp_force_b[i, 0] = c * force_s[i, 0] - s * force_s[i, 2]
-        state.grasp_force_b[i, 1] = force_s[i, 1]
-        state.grasp_force_b[i, 2] = s * force_s[i, 0] + c * force_s[i, 2]
+@compilable
+def read_robot(i: int, position: Array, velocity: Array, state: PlantState) -> None:
+    """Fill in base and arm of simulation i from the first five of qpos and qvel, (n, ...)."""
+    heading = position[i, 2]
+    c, s = cos(heading), sin(heading)
+    for k in range(3):
+        state.base_pose[i, k] = position[i, k]
+    state.base_velocity[i, 0] = c * velocity[i, 0] + s * velocity[i, 1]
+    state.base_velocity[i, 1] = velocity[i, 2]
+    state.lateral_speed[i] = c * velocity[i, 1] - s * velocity[i, 0]
+    for k in range(2):
+        state.joints[i, k] = position[i, 3 + k]
+        state.joint_rates[i, k] = velocity[i, 3 + k]

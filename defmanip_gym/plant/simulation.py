@@ -13,13 +13,13 @@ from mujoco import batch
 from numpy.typing import NDArray
 
 from defmanip_gym.compiled import compiled, machine_code
-from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.params import RobotParams
 from defmanip_gym.plant import names
-from defmanip_gym.plant.beam_variation import BeamVariation
 from defmanip_gym.plant.builder import build_model
 from defmanip_gym.plant.divergence import DivergenceSentinel
 from defmanip_gym.plant.forks import new_batch
-from defmanip_gym.plant.plant_state import PlantState, read_state
+from defmanip_gym.plant.payload_body import PayloadBody
+from defmanip_gym.plant.plant_state import PlantState
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Simulation:
 
     Args:
         robot: true robot parameters.
-        beam: true beam parameters.
+        body: what it truly carries.
         count: number of simulations n.
         goal_position_m: where the goal marker stands, world frame.
         physics_period_s: integration step.
@@ -43,7 +43,7 @@ class Simulation:
     def __init__(
         self,
         robot: RobotParams,
-        beam: BeamParams,
+        body: PayloadBody,
         *,
         count: int,
         goal_position_m: tuple[float, float, float],
@@ -51,33 +51,33 @@ class Simulation:
         num_threads: int = 0,
     ) -> None:
         self.model = build_model(
-            robot, beam, goal_position_m=goal_position_m, physics_period_s=physics_period_s
+            robot, body, goal_position_m=goal_position_m, physics_period_s=physics_period_s
         )
         self.count = count
         self._threads = min(count, num_threads or os.cpu_count() or 1)
         self._bind(new_batch(self.model, count, self._threads))
         self._pristine = self._batch.state[0].copy()
-        self._variation = BeamVariation(self._batch, beam)
+        self.body, self._variation = body, body.variation(self._batch)
         self._grasp_force_s = np.zeros((count, 3))
         self._readings = np.zeros((count, 1, 3))
         self._forearm = self.model.body(names.FOREARM).id
         self._forearm_com_m = float(self.model.body(names.FOREARM).ipos[0])
         self._forearm_length_m = robot.forearm.length_m
-        self._segments, self._period_s = beam.segment_count, float(physics_period_s)
+        self._period_s = float(physics_period_s)
         self._all = np.arange(count)
         self._read = machine_code(
-            read_state,
+            body.read,
             self._all,
             self._position,
             self._velocity,
             self._grasp_force_s,
-            PlantState.empty(count, self._segments),
+            PlantState.empty(count, body.count),
         )
         self._lead = machine_code(
             _lead_no_slip, self._position, self._velocity, self._period_s, self._lateral_target
         )
         self._sense = machine_code(
-            _sense, self._all, self._position, np.empty((1, 3)), self._grasp_force_s
+            body.sense, self._all, self._position, np.empty((1, 3)), self._grasp_force_s
         )
         self._conclude = machine_code(
             _conclude,
@@ -125,7 +125,7 @@ class Simulation:
 
     def read(self) -> PlantState:
         """Return the current state and the grasp force at this instant."""
-        state = PlantState.empty(self.count, self._segments)
+        state = PlantState.empty(self.count, self.body.count)
         self.read_into(state, self._all)
         return state
 
@@ -133,23 +133,21 @@ class Simulation:
         """Fill in the rows ``ids`` of a state of n simulations."""
         self._read(ids, self._position, self._velocity, self._grasp_force_s, state)
 
-    def carry(self, ids: NDArray[np.intp], beams: Sequence[BeamParams]) -> None:
-        """Let simulations carry other beams than the given one; place them afterwards.
+    def carry(self, ids: NDArray[np.intp], things: Sequence[Any]) -> None:
+        """Let simulations carry others than the given one; place them afterwards.
 
         Raises:
-            ParameterError: beams that differ in more than damping, mass and length.
+            ParameterError: others than its body lets differ.
         """
         self._require_threads()
-        self._variation.set(ids, beams)
+        self._variation.set(ids, things)
 
     def place(self, ids: NDArray[np.intp], pose: Array, joints: Array, swing: Array) -> None:
-        """Put simulations at rest: ``pose`` (k, 3), ``joints`` (k, 2), ``swing`` (k, N)."""
+        """Put simulations at rest: ``pose`` (k, 3), ``joints`` (k, 2), ``swing`` (k, N) for z2."""
         self._batch.state[ids] = self._pristine  # what Batch.reset does, at a fraction of its cost
         self._sentinel.arm(ids)
-        # a hinge turns relative to its parent
-        pitch = np.concatenate((joints[:, :1] + joints[:, 1:], swing), axis=1)
-        hinges = pitch[:, 1:] - pitch[:, :-1]
-        self._position[ids] = np.concatenate((pose, joints, hinges), axis=1)
+        held = self.body.positions(joints, swing)
+        self._position[ids] = np.concatenate((pose, joints, held), axis=1)
 
     def move(
         self,
@@ -160,14 +158,13 @@ class Simulation:
     ) -> None:
         """Set simulations in motion: (u1, u2) (k, 2), q̇_a (k, 2), φ̇ (k, N)."""
         heading = self._position[ids, 2]
-        absolute = np.concatenate((joint_rates.sum(axis=1, keepdims=True), swing_rate), axis=1)
         self._velocity[ids] = np.column_stack(
             (
                 np.cos(heading) * base_velocity[:, 0],
                 np.sin(heading) * base_velocity[:, 0],
                 base_velocity[:, 1],
                 joint_rates,
-                np.diff(absolute, axis=1),
+                self.body.positions(joint_rates, swing_rate),
             )
         )
 
@@ -242,18 +239,6 @@ def _lead_no_slip(position: Array, velocity: Array, period_s: float, target: Arr
         heading = position[i, 2]
         forward = cos(heading) * velocity[i, 0] + sin(heading) * velocity[i, 1]
         target[i] = forward * velocity[i, 2] * period_s
-
-
-@compiled
-def _sense(ids: NDArray[np.intp], position: Array, force_b: Array, force_s: Array) -> None:
-    """Write forces in the base frame as the sensor in the first segment's frame reads them."""
-    for row in range(len(ids)):
-        i = ids[row]
-        swing = position[i, 3] + position[i, 4] + position[i, 5]
-        c, s = cos(swing), sin(swing)
-        force_s[i, 0] = c * force_b[row, 0] + s * force_b[row, 2]
-        force_s[i, 1] = force_b[row, 1]
-        force_s[i, 2] = c * force_b[row, 2] - s * force_b[row, 0]
 
 
 @compiled

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams, DisturbanceParams
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.task_params import StartParams, TaskParams
 from defmanip_gym.theory.certificates import certify
 from defmanip_gym.theory.control.control_laws import ForceLoopGains
@@ -113,7 +114,7 @@ def paper_setting(
         environment=TransportConfig(
             constraint_mode="cost",
             sigma_rad=SIGMA_RAD,
-            beam=BeamParams(damping=PLANT_DAMPING),
+            payload=RodPayload(beam=BeamParams(damping=PLANT_DAMPING)),
             task=task,
             disturbance=disturbance,
         ),

@@ -16,6 +16,7 @@ from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import Scenario
 from defmanip_gym.params import PAPER_DISTURBANCE, BeamParams
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.reproduction.course import POSITION
 from defmanip_gym.reproduction.parts import Numbers, Part
 from defmanip_gym.reproduction.setting import PLANT_DAMPING, SIGMA_RAD, paper_setting
@@ -38,7 +39,9 @@ _LARGEST_LINEAR = 0.4  # beyond this amplitude (rad · rad/s) the swing is not e
 def damping_study(max_duration_s: float) -> Part:
     """Let a beam of damping 0.1 swing at the goal under force laws that assume other dampings."""
     config = TransportConfig(
-        constraint_mode="cost", sigma_rad=SIGMA_RAD, beam=BeamParams(damping=PLANT_DAMPING)
+        constraint_mode="cost",
+        sigma_rad=SIGMA_RAD,
+        payload=RodPayload(beam=BeamParams(damping=PLANT_DAMPING)),
     )
     numbers: list[Numbers] = []
     arrays: dict[str, Array] = {}
@@ -123,7 +126,10 @@ def l1_transport(max_duration_s: float) -> Part:
     certificate = l1_certificate()
     beam = BeamParams(damping=PLANT_DAMPING)
     config = TransportConfig(
-        constraint_mode="cost", sigma_rad=SIGMA_RAD, beam=beam, disturbance=PAPER_DISTURBANCE
+        constraint_mode="cost",
+        sigma_rad=SIGMA_RAD,
+        payload=RodPayload(beam=beam),
+        disturbance=PAPER_DISTURBANCE,
     )
     scenario = Scenario(
         name="paper",

@@ -57,7 +57,7 @@ class PaperLoop:
         )
         self._simulation = Simulation(
             config.robot,
-            config.beam,
+            config.payload.body(),
             count=1,
             goal_position_m=config.goal_position_m,
             physics_period_s=self._physics_period_s,

@@ -8,7 +8,6 @@ judged before the first step, what only the motion tells while it lasts.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
@@ -30,12 +29,12 @@ def require_fit(config: TransportConfig, safety_filter: SafetyFilter) -> None:
             "'task'",
             "A filter changes the task acceleration; make the environment in task mode.",
         )
-    if safety_filter.segment_count != config.beam.segment_count:
+    if safety_filter.segment_count != config.payload.count:
         raise CertificateError(
             "segment_count of the filter's object",
             safety_filter.segment_count,
-            f"{config.beam.segment_count}, as in the environment",
-            "Make it for the environment's beam.",
+            f"{config.payload.count}, as in the environment",
+            "Make it for the environment's payload.",
         )
     if safety_filter.sigma_rad > config.sigma_rad:
         raise CertificateError(
@@ -79,8 +78,8 @@ class Applicability(Promise):
     @cached_property
     def configuration_reason(self) -> str:
         """Why the promise covers no episode of this environment; empty if it may."""
-        if not all(self._filter.covers(beam) for beam in self._beams):
-            return "it was not computed for the beams that are carried"
+        if not all(map(self._filter.covers, self._config.payload.carried)):
+            return "it was not computed for what is carried"
         if self._filter.proof == "none":
             return f"what {self._terms.method!r} allows is not proven"
         if self._action_changers:
@@ -94,11 +93,6 @@ class Applicability(Promise):
             return self._terms.configuration_reason
         except CertificateError as error:
             return f"its errors are not known: {error}"
-
-    @property
-    def _beams(self) -> tuple[Any, ...]:
-        """The beams that may be carried: what a filter covers are intervals, so ends tell."""
-        return self._config.beam_ranges.extremes(self._config.beam)
 
 
 def _terms(config: TransportConfig, safety_filter: SafetyFilter) -> Terms:

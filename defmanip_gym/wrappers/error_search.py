@@ -24,7 +24,7 @@ from defmanip_gym.envs.inner_loop import InnerLoop
 from defmanip_gym.envs.survey import clean_observations
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import GRAVITY_M_S2, BeamRanges
+from defmanip_gym.params import GRAVITY_M_S2
 from defmanip_gym.plant.simulation import Simulation
 from defmanip_gym.theory.dynamics.frames import base_to_world
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
@@ -64,7 +64,7 @@ class PeriodErrors(NamedTuple):
 
 def require_affordable(config: TransportConfig) -> None:
     """Raise CertificateError where the search would take too long."""
-    work = config.beam.segment_count * config.task.substeps
+    work = config.payload.count * config.task.substeps
     if work > _MOST_WORK:
         raise CertificateError(
             "segments times physics steps in a control period",
@@ -75,15 +75,13 @@ def require_affordable(config: TransportConfig) -> None:
 
 
 def worst_cases(config: TransportConfig) -> Iterator[TransportConfig]:
-    """Yield an environment with each of its extreme beams, disturbed the most."""
-    beams = dict.fromkeys(config.beam_ranges.extremes(config.beam))
+    """Yield an environment with each of its extreme payloads, disturbed the most."""
+    payloads = config.payload.extremes
     disturbances = config.disturbance_ranges.worst(config.disturbance, config.task.control_period_s)
-    for beam, disturbance in product(beams, disturbances):
+    for payload, disturbance in product(payloads, disturbances):
         yield replace(
             config,
-            beam=beam,
-            nominal_beam=config.believed_beam,
-            beam_ranges=BeamRanges(),
+            payload=payload,
             disturbance=disturbance,
             disturbance_ranges=DisturbanceRanges(),
         )
@@ -93,7 +91,7 @@ class ErrorSearch:
     """Some of the robots start from rest, the others are on their way.
 
     Args:
-        config: the environment's definition, with the beam that is carried.
+        config: the environment's definition, with what is carried.
         safety_filter: that is enforced.
         resting: motions of robots at rest.
         moving: and of robots on their way.
@@ -115,10 +113,10 @@ class ErrorSearch:
     ) -> None:
         count = len(resting.joints) + len(moving.joints)
         self._config, self._count, self._rng = config, count, rng
-        self._layout = ObservationLayout(config.beam.segment_count)
+        self._layout = ObservationLayout(config.payload.count)
         self._simulation = Simulation(
             config.robot,
-            config.beam,
+            config.payload.body(),
             count=count,
             goal_position_m=config.goal_position_m,
             physics_period_s=config.task.physics_period_s,
@@ -193,7 +191,7 @@ class ErrorSearch:
         """Let sensors read what holding the object still would take, and then what that causes."""
         everybody, simulation = np.arange(self._count), self._simulation
         weight = np.zeros((self._count, 3))
-        weight[:, 2] = self._config.beam.mass_kg * GRAVITY_M_S2
+        weight[:, 2] = self._config.payload.mass_kg * GRAVITY_M_S2
         self._inner_loop.begin(everybody, self._as_read(weight), np.zeros((self._count, 1)))
         forces, plant = np.zeros_like(simulation.generalized_forces), simulation.read()
         self._inner_loop.write_forces(np.zeros((self._count, 3)), plant, forces)

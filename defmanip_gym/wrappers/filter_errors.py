@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.workspace import in_workspace, workspace_of
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.theory.filters.storage_keeping import StorageKeeping
 from defmanip_gym.wrappers.error_search import ErrorSearch, require_affordable, worst_cases
 from defmanip_gym.wrappers.filter_motions import moving_states, resting_states
 
@@ -39,12 +39,12 @@ class FilterErrors:
 
 
 @lru_cache(maxsize=64)
-def filter_errors(config: TransportConfig, safety_filter: StorageFilter) -> FilterErrors:
+def filter_errors(config: TransportConfig, safety_filter: StorageKeeping) -> FilterErrors:
     """Return how far motions stray from what a storage filter foresees.
 
     Args:
         config: the environment's definition, in task mode.
-        safety_filter: for its beams; it acts in the search.
+        safety_filter: for what is carried; it acts in the search.
 
     Raises:
         CertificateError: the search would take too long.
@@ -59,11 +59,11 @@ def filter_errors(config: TransportConfig, safety_filter: StorageFilter) -> Filt
     )
 
 
-def _errors(config: TransportConfig, safety_filter: StorageFilter) -> Array:
+def _errors(config: TransportConfig, safety_filter: StorageKeeping) -> Array:
     """Return changes of the offset, offsets and errors of the storage, (7,), as found."""
     rng = np.random.default_rng(0)
     noiseless = safety_filter.with_conditions(swing_noise_rad=0.0)
-    carried = noiseless.for_beam(config.beam)
+    carried = noiseless.for_carried(config.payload.carried[0])
     search = ErrorSearch(
         config,
         noiseless,
@@ -73,7 +73,7 @@ def _errors(config: TransportConfig, safety_filter: StorageFilter) -> Array:
         periods=_PERIODS,
         delay_periods=safety_filter.conditions.delay_periods,
     )
-    layout, space = ObservationLayout(config.beam.segment_count), workspace_of(config)
+    layout, space = ObservationLayout(config.payload.count), workspace_of(config)
     errors, running = np.zeros(_FOUND), np.ones(_COUNT, dtype=bool)
     for period in search.periods():
         pitch = layout.part(period.after, "joints").cumsum(axis=1)

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError, ParameterError
 from defmanip_gym.params import BeamParams
+from defmanip_gym.payloads.mjcf import MjcfPayload
 from defmanip_gym.theory.filters.conditions import (
     LARGEST_FACTOR,
     FilterConditions,
     PayloadIntervals,
 )
 from defmanip_gym.theory.filters.family import REFERENCE_FILTERS, STORAGE_FILTERS
+from defmanip_gym.theory.filters.object_filter import ObjectConditions, ObjectStorageFilter
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.validation import require_instance, require_params
 from defmanip_gym.wrappers.applicability import require_fit
 from defmanip_gym.wrappers.filter_errors import FilterErrors, filter_errors
 
+_Made = TypeVar("_Made", StorageFilter, ObjectStorageFilter)
 _KINDS = (*STORAGE_FILTERS.values(), *REFERENCE_FILTERS.values())
 _ROUNDS = 4
 _SPARE = 1.05  # another level makes other errors
@@ -59,12 +64,47 @@ def filter_for(
         conditions=conditions,
         intervals=_drawn_around(config, beam) if intervals is None else intervals,
     )
+    return _with_room(config, made)
+
+
+def payload_filter_for(
+    config: TransportConfig, *, delay_periods: int = 0
+) -> StorageFilter | ObjectStorageFilter:
+    """Return the filter for whatever an environment carries; of rods as ``filter_for`` does.
+
+    Args:
+        config: ``env.unwrapped.config``, in task mode.
+        delay_periods: control periods until an action takes effect, as ``ActionDelay`` has them.
+
+    Raises:
+        CertificateError: errors, noise and delay leave nothing of V_σ.
+        ObjectFileError: the object has springs that links do not.
+    """
+    require_instance("config", config, TransportConfig)
+    if not isinstance(config.payload, MjcfPayload):
+        return filter_for(config, delay_periods=delay_periods)
+    made = ObjectStorageFilter(
+        config.payload.linkage,
+        mass_kg=config.payload.mass_kg,
+        sigma_rad=config.sigma_rad,
+        robot=config.robot,
+        task=config.task,
+        conditions=ObjectConditions(
+            swing_noise_rad=config.largest_disturbance.swing_sensor_noise_rad,
+            delay_periods=delay_periods,
+        ),
+    )
+    return _with_room(config, made)
+
+
+def _with_room(config: TransportConfig, made: _Made) -> _Made:
+    """Return the filter with room for the errors that its environment makes."""
     require_fit(config, made)
     for _ in range(_ROUNDS):
         found, given = filter_errors(config, made), made.conditions
         if max(found.acceleration_m_s2) > _HOPELESS_M_S2:
             break
-        needed = _provided(found)
+        needed = _provided(found, given)
         if all(size <= getattr(given, name) for name, size in needed.items()):
             return made
         room = {name: max(getattr(given, name), _SPARE * size) for name, size in needed.items()}
@@ -78,10 +118,12 @@ def filter_for(
     )
 
 
-def _provided(found: FilterErrors) -> dict[str, float]:
-    """Return the fields of ``FilterConditions`` that errors need."""
+def _provided(found: FilterErrors, conditions: FilterConditions) -> dict[str, float]:
+    """Return the fields of conditions that errors need."""
     forward, lateral, vertical = found.acceleration_m_s2
-    return {
+    felt = isinstance(conditions, ObjectConditions)  # rods do not mind what pushes them aside
+    aside = {"lateral_offset_m_s2": found.offset_m_s2[1]} if felt else {}
+    return aside | {
         "forward_error_m_s2": forward,
         "lateral_error_m_s2": lateral,
         "vertical_error_m_s2": vertical,

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH, PITCH_TO_JOINT, ArmKinematics
-from defmanip_gym.theory.filters.reserves import hanging_modes
-from defmanip_gym.theory.filters.storage_filter import StorageFilter
+from defmanip_gym.theory.filters.storage_keeping import StorageKeeping
 from defmanip_gym.wrappers.admissible_motions import Motions, about_zero, arm_range, drawn
 
 Array = NDArray[np.float64]
@@ -25,22 +24,21 @@ _SCALINGS = 40
 def resting_states(
     config: TransportConfig, count: int, rng: np.random.Generator, swing_rad: float
 ) -> Motions:
-    """Draw starts: at rest, the beam straight, up to the largest swing of ``task.start``."""
-    segments = config.beam.segment_count
-    swing = about_zero(rng, swing_rad, (count, 1))
+    """Draw starts: at rest, the object swung up to the largest swing of ``task.start``."""
+    swing = config.payload.swung(about_zero(rng, swing_rad, (count,)))
     return Motions(
         joints=drawn(rng, *arm_range(config), (count, 2)),
         joint_rates=np.zeros((count, 2)),
         base_velocity=np.zeros((count, 2)),
-        swing=np.repeat(swing, segments, axis=1),
-        swing_rate=np.zeros((count, segments)),
+        swing=swing,
+        swing_rate=np.zeros_like(swing),
     )
 
 
 def moving_states(
-    config: TransportConfig, safety_filter: StorageFilter, count: int, rng: np.random.Generator
+    config: TransportConfig, safety_filter: StorageKeeping, count: int, rng: np.random.Generator
 ) -> Motions:
-    """Draw robots on their way, with beams that store up to the filter's level.
+    """Draw robots on their way, with objects that store up to the filter's level.
 
     Grasps are anywhere that the arm reaches with the reach of starts and goal and its elbow bent,
     as fast as they may be in any direction.
@@ -70,7 +68,7 @@ def moving_states(
 
 
 def _reachable(
-    safety_filter: StorageFilter, reach: Array, rng: np.random.Generator
+    safety_filter: StorageKeeping, reach: Array, rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
     """Return reaches at which the filter lets the arm be, with lowest and highest grasps, (n,) m.
 
@@ -103,7 +101,7 @@ def _pitch(config: TransportConfig, reach: Array, height: Array) -> Array:
 
 
 def _vertical_speeds(
-    safety_filter: StorageFilter, below: Array, above: Array, rng: np.random.Generator
+    safety_filter: StorageKeeping, below: Array, above: Array, rng: np.random.Generator
 ) -> Array:
     """Draw vertical speeds, (n,) m/s, that can be had and stopped within the arm's range."""
     task = safety_filter.task
@@ -115,14 +113,14 @@ def _vertical_speeds(
 
 
 def _stored(
-    safety_filter: StorageFilter, turning: Array, count: int, rng: np.random.Generator
+    safety_filter: StorageKeeping, turning: Array, count: int, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Draw swings and rates, (n, N) each, that store up to the level, many of them just that.
 
     Modes that swing faster than a control period can follow start at rest; the commands of the
     search excite them as far as commands do.
     """
-    frequencies, modes = hanging_modes(safety_filter.beam)
+    frequencies, modes = safety_filter.modes()
     followed = frequencies * safety_filter.task.control_period_s < _FOLLOWED_RAD
     followed[0] = True
     frequencies, modes = frequencies[followed], modes[:, followed]
@@ -134,6 +132,7 @@ def _stored(
     wanted = drawn(rng, np.array(0.0), np.array(1.0), (count,))
     factor = np.ones(count)
     for _ in range(_SCALINGS):  # B grows about with the square
-        stored = safety_filter.shares_of(factor[:, None] * swing, factor[:, None] * rate, turning)
+        away, moving = factor[:, None] * swing, factor[:, None] * rate
+        stored = safety_filter.shares_of(safety_filter.equilibrium + away, moving, turning)
         factor *= np.sqrt(np.maximum(wanted, 1e-6) / np.maximum(stored, 1e-9)).clip(0.5, 2.0)
-    return factor[:, None] * swing, factor[:, None] * rate
+    return safety_filter.equilibrium + factor[:, None] * swing, factor[:, None] * rate

@@ -4,6 +4,7 @@ import pytest
 
 from defmanip_gym.params import BeamParams, LinkParams, RobotParams
 from defmanip_gym.plant.builder import build_model
+from defmanip_gym.plant.rod_body import RodBody
 from defmanip_gym.theory.dynamics.robot_model import robot_chain
 from defmanip_gym.theory.payload.object_model import HangingBeam
 
@@ -20,7 +21,7 @@ def random_state(count, seed):
     """Return MuJoCo data at a random state, α, v and the reduction S with Ṡ v."""
     rng = np.random.default_rng(seed)
     beam = BeamParams(mass_kg=2.2, length_m=0.9, damping=0.7, segment_count=count)
-    model = build_model(ROBOT, beam, goal_position_m=(0, 0, 1), physics_period_s=0.005)
+    model = build_model(ROBOT, RodBody(beam), goal_position_m=(0, 0, 1), physics_period_s=0.005)
     data = mujoco.MjData(model)
     data.qpos[:] = rng.uniform(-3, 3, model.nq)
     velocity = rng.normal(size=4 + count)

@@ -9,6 +9,7 @@ import pytest
 
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.theory.filters.conditions import FilterConditions
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.wrappers.filter_errors import filter_errors
@@ -55,5 +56,7 @@ def test_errors_of_the_reference_robot_are_what_filters_provide_for_by_default()
 def test_a_robot_that_believes_another_beam_makes_larger_errors():
     made = StorageFilter()
     wrong = replace(BeamParams(), mass_kg=1.2 * BeamParams().mass_kg, damping=0.0)
-    believing = filter_errors(TransportConfig(nominal_beam=wrong), made).acceleration_m_s2
+    believing = filter_errors(
+        TransportConfig(payload=RodPayload(nominal_beam=wrong)), made
+    ).acceleration_m_s2
     assert max(believing) > 3 * max(filter_errors(TransportConfig(), made).acceleration_m_s2)

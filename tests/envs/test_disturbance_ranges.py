@@ -14,6 +14,7 @@ from defmanip_gym.envs.registration import ENV_ID
 from defmanip_gym.errors import CertificateError, ParameterError
 from defmanip_gym.evaluation.rollout import courses
 from defmanip_gym.params import BeamParams, DisturbanceParams
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.theory.filters.storage_filter import StorageFilter
 from defmanip_gym.wrappers.filter_errors import filter_errors
 from defmanip_gym.wrappers.filter_for import filter_for
@@ -147,7 +148,9 @@ def test_filters_provide_for_a_bias_of_either_sign():
     heavier = replace(BeamParams(), mass_kg=1.1 * BeamParams().mass_kg)  # is what robots believe
 
     def errors(**arguments):
-        return filter_errors(TransportConfig(nominal_beam=heavier, **arguments), StorageFilter())
+        return filter_errors(
+            TransportConfig(payload=RodPayload(nominal_beam=heavier), **arguments), StorageFilter()
+        )
 
     one_way, other_way = (
         errors(disturbance=DisturbanceParams(force_bias_n=bias)) for bias in (-2.0, 1.9)

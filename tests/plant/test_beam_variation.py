@@ -11,6 +11,7 @@ from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant import names
 from defmanip_gym.plant.beam_variation import BeamVariation
 from defmanip_gym.plant.builder import build_model
+from defmanip_gym.plant.rod_body import RodBody
 
 CHANGES = [
     {"damping": 0.0},
@@ -23,7 +24,9 @@ CHANGES = [
 
 
 def batch_of(beam, count=1):
-    model = build_model(RobotParams(), beam, goal_position_m=(0, 0, 1), physics_period_s=0.005)
+    model = build_model(
+        RobotParams(), RodBody(beam), goal_position_m=(0, 0, 1), physics_period_s=0.005
+    )
     return batch.Batch(model, count, nthread=1)
 
 

@@ -6,11 +6,15 @@ from defmanip_gym.errors import ParameterError
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.plant import names
 from defmanip_gym.plant.builder import build_model
+from defmanip_gym.plant.rod_body import RodBody
 
 
 def build(beam=None):
     return build_model(
-        RobotParams(), beam or BeamParams(), goal_position_m=(0, 0, 1), physics_period_s=0.005
+        RobotParams(),
+        RodBody(beam or BeamParams()),
+        goal_position_m=(0, 0, 1),
+        physics_period_s=0.005,
     )
 
 

@@ -57,7 +57,7 @@ def test_it_applies_where_errors_have_room(arguments):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        ({"beam": BeamParams(damping=0.05)}, "not computed for the beams"),
+        ({"beam": BeamParams(damping=0.05)}, "not computed for what"),
         ({"disturbance": DisturbanceParams(swing_sensor_noise_rad=0.02)}, "measured to within"),
         ({"disturbance": DisturbanceParams(force_amplitude_n=2, force_frequency_rad_s=5)}, ""),
         ({"disturbance": DisturbanceParams(force_bias_n=2.0)}, ""),

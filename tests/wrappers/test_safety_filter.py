@@ -117,7 +117,7 @@ def test_it_passes_gymnasiums_check():
 @pytest.mark.parametrize(
     ("arguments", "made", "told"),
     [
-        ({"beam": BeamParams(length_m=0.5)}, {}, "not computed for the beams"),
+        ({"beam": BeamParams(length_m=0.5)}, {}, "not computed for what"),
         ({"disturbance": DisturbanceParams(swing_sensor_noise_rad=0.02)}, {}, "with noise of 0.02"),
         ({"robot": RobotParams(drive_force_limit_n=60.0)}, {}, "forward errors"),
         ({"beam": BeamParams(), "nominal_beam": BeamParams(mass_kg=4.5)}, {}, "errors"),

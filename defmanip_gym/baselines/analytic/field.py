@@ -19,17 +19,14 @@ from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLa
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import GainError
-from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.params import RobotParams
+from defmanip_gym.payloads.payload import Payload
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.observed_loop import ObservedLoop
 from defmanip_gym.theory.control.swing_following import SwingFollowing
 from defmanip_gym.theory.dynamics.robot_model import JOINT_TO_PITCH
-from defmanip_gym.validation import (
-    require_non_negative,
-    require_params,
-    require_positive,
-    settle,
-)
+from defmanip_gym.validation import require_non_negative, require_params, require_positive, settle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +71,7 @@ class FieldController(SampledLaw):
     """Velocity field, tracking (20), swing following and a disturbance observer; any object.
 
     Args:
-        beam: the object as the controller knows it.
+        payload: the object as the controller knows it, the reference rod by default.
         robot: the robot as the controller knows it.
         task: goal, limits and control period.
         params: design choices.
@@ -88,13 +85,13 @@ class FieldController(SampledLaw):
     def __init__(
         self,
         *,
-        beam: BeamParams | None = None,
+        payload: Payload | None = None,
         robot: RobotParams | None = None,
         task: TaskParams | None = None,
         params: FieldParams | None = None,
     ) -> None:
         params = FieldParams() if params is None else require_params("params", params, FieldParams)
-        super().__init__(beam=beam, robot=robot, task=task, params=params)
+        super().__init__(payload=payload or RodPayload(), robot=robot, task=task, params=params)
         self.field = params.way.field(self.task, self.goal_reach_m)
         self._check_gains()
         bound = min(params.acceleration_bound, self.task.max_acceleration_m_s2)
@@ -106,7 +103,7 @@ class FieldController(SampledLaw):
             period_s=self.task.control_period_s,
             feedforward=True,
         )
-        self.following = SwingFollowing(self.beam, rate=params.following_rate)
+        self.following = SwingFollowing(self.payload.linear, rate=params.following_rate)
 
     def begin(self, now: GraspSample) -> Memory:
         """Return nothing: the law has no memory of its own."""
@@ -122,13 +119,14 @@ class FieldController(SampledLaw):
         return ObservedLoop(
             robot=self.robot,
             goal_pitch=JOINT_TO_PITCH @ np.array(self.task.goal[3:5]),
-            beam=self.beam,
-            believed_beam=self.beam if believes else None,
+            carried=self.payload.linear,
+            believed=self.payload.linear if believes else None,
             tracking_gain=params.tracking_gain,
             approach_rate=params.way.approach_rate_per_s,
             observer_gain=params.observer_gain_per_s,
             following_rate=params.following_rate,
             period_s=self.task.control_period_s,
+            inertia_shares=self.payload.inertia_shares,
         )
 
     def _check_gains(self) -> None:
@@ -147,4 +145,4 @@ class FieldController(SampledLaw):
 
 def make_controller(config: TransportConfig) -> FieldController:
     """Velocity field, tracking and disturbance observer over the inner loop that feels the load."""
-    return FieldController(beam=config.beam, robot=config.believed_robot, task=config.task)
+    return FieldController(payload=config.payload, robot=config.believed_robot, task=config.task)

@@ -18,6 +18,7 @@ from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLa
 from defmanip_gym.baselines.analytic.way_params import WayParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.payloads.rod import beam_payload
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.moving_reference import MovingReference
 from defmanip_gym.theory.control.sampled_lqr import (
@@ -83,7 +84,7 @@ class LqrController(SampledLaw):
         params: LqrParams | None = None,
     ) -> None:
         params = LqrParams() if params is None else require_params("params", params, LqrParams)
-        super().__init__(beam=beam, robot=robot, task=task, params=params)
+        super().__init__(payload=beam_payload(beam), robot=robot, task=task, params=params)
         self.field = params.way.field(self.task, self.goal_reach_m)
         linear, period = linearize(self.beam), self.task.control_period_s
         self.forward_gains = forward_gains(linear, self.params.weights, period)

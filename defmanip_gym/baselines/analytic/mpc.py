@@ -17,6 +17,7 @@ from defmanip_gym.baselines.analytic.mpc_params import MpcParams
 from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLaw
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams, RobotParams, validated_sigma
+from defmanip_gym.payloads.rod import beam_payload
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.control_laws import saturated_tracking
 from defmanip_gym.theory.control.horizon import HorizonStart
@@ -61,7 +62,7 @@ class MpcController(SampledLaw):
         params: MpcParams | None = None,
     ) -> None:
         params = MpcParams() if params is None else require_params("params", params, MpcParams)
-        super().__init__(beam=beam, robot=robot, task=task, params=params)
+        super().__init__(payload=beam_payload(beam), robot=robot, task=task, params=params)
         self.field = params.way.field(self.task, self.goal_reach_m)
         self.limit = params.acceleration_share * self.task.max_acceleration_m_s2
         self.prediction = Prediction(

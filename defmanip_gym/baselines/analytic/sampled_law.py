@@ -19,6 +19,8 @@ from defmanip_gym.baselines.controller import State
 from defmanip_gym.envs.config import InnerLoopKind
 from defmanip_gym.observation import ObservationLayout
 from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.payloads.payload import Payload
+from defmanip_gym.payloads.rod import rod_of
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.control.disturbance_observer import (
     DisturbanceObserver,
@@ -36,7 +38,7 @@ class SampledLaw(ABC):
     """A control law for any number of episodes at a time; it keeps nothing of them itself.
 
     Args:
-        beam: the object as the law knows it.
+        payload: the object as the law knows it.
         robot: the robot as the law knows it.
         task: goal, limits and control period.
         params: design choices.
@@ -47,16 +49,16 @@ class SampledLaw(ABC):
     def __init__(
         self,
         *,
-        beam: BeamParams | None,
+        payload: Payload,
         robot: RobotParams | None,
         task: TaskParams | None,
         params: LawParams,
     ) -> None:
         self.params = params
-        self.beam = BeamParams() if beam is None else require_params("beam", beam, BeamParams)
+        self.payload = payload
         self.robot = RobotParams() if robot is None else require_params("robot", robot, RobotParams)
         self.task = TaskParams() if task is None else require_params("task", task, TaskParams)
-        self.layout = ObservationLayout(self.beam.segment_count)
+        self.layout = ObservationLayout(payload.count)
         self.kinematics = ArmKinematics(self.robot)
         goal_pitch = JOINT_TO_PITCH @ np.array(self.task.goal[3:5])
         self.goal_reach_m = float(self.kinematics.reach_and_height(goal_pitch)[0])
@@ -68,6 +70,15 @@ class SampledLaw(ABC):
         )
 
     @property
+    def beam(self) -> BeamParams:
+        """The rod as the law knows it.
+
+        Raises:
+            PayloadError: the object is another one.
+        """
+        return rod_of(self.payload).beam
+
+    @property
     def inner_loop(self) -> InnerLoopKind:
         """The inner loop that the environment is to have."""
         return self.params.inner_loop
@@ -75,8 +86,8 @@ class SampledLaw(ABC):
     @property
     def identity(self) -> dict[str, Any]:
         """What its behaviour depends on, as JSON values."""
-        parts = {"params": self.params, "beam": self.beam, "robot": self.robot, "task": self.task}
-        return {name: plain(part) for name, part in parts.items()}
+        parts = {"params": self.params, "robot": self.robot, "task": self.task}
+        return {name: plain(part) for name, part in parts.items()} | self.payload.known
 
     @abstractmethod
     def begin(self, now: GraspSample) -> Memory:

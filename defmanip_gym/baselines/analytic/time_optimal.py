@@ -19,6 +19,7 @@ from defmanip_gym.baselines.analytic.sampled_law import Array, Memory, SampledLa
 from defmanip_gym.baselines.analytic.time_optimal_params import TimeOptimalParams
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.params import BeamParams, RobotParams
+from defmanip_gym.payloads.rod import beam_payload
 from defmanip_gym.planning.following import Following
 from defmanip_gym.planning.setting import PlanningSetting
 from defmanip_gym.planning.stored import StoredPlans
@@ -66,7 +67,7 @@ class TimeOptimalController(SampledLaw):
     ) -> None:
         given = TimeOptimalParams() if params is None else params
         params = require_params("params", given, TimeOptimalParams)
-        super().__init__(beam=beam, robot=robot, task=task, params=params)
+        super().__init__(payload=beam_payload(beam), robot=robot, task=task, params=params)
         self.setting = PlanningSetting(
             beam=self.beam, robot=self.robot, task=self.task, sigma_rad=sigma_rad
         )

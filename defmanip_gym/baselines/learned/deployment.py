@@ -17,7 +17,8 @@ from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.registration import environment_arguments
 from defmanip_gym.errors import AgentFileError, InvalidValueError, ParameterError
 from defmanip_gym.observation import ObservationLayout
-from defmanip_gym.params import BeamParams
+from defmanip_gym.params import BeamParams, BeamRanges
+from defmanip_gym.payloads.choice import payload_of
 from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, Certificate, certify
 from defmanip_gym.theory.filters.family import require_filter
@@ -36,8 +37,15 @@ def training_config(card: AgentCard) -> TransportConfig:
     if not isinstance(changes, Mapping):
         raise _foreign(changes)
     arguments = environment_arguments(card.env_id) | dict(changes)
+    given = {name: arguments[name] for name in _CONFIGURED & set(arguments)}
     try:
-        return TransportConfig(**{name: arguments[name] for name in _CONFIGURED & set(arguments)})
+        given["payload"] = payload_of(
+            arguments.get("payload"),
+            beam=arguments.get("beam", BeamParams()),
+            beam_ranges=arguments.get("beam_ranges", BeamRanges()),
+            nominal_beam=arguments.get("nominal_beam"),
+        )
+        return TransportConfig(**given)
     except (InvalidValueError, TypeError) as error:
         raise _foreign(changes) from error
 

@@ -15,7 +15,6 @@ from defmanip_gym.envs.engine import TransportEngine
 from defmanip_gym.envs.rendering.graphics import GRAPHICS
 from defmanip_gym.envs.rendering.opengl import open_context
 from defmanip_gym.envs.rendering.view_params import ViewParams
-from defmanip_gym.plant import names
 from defmanip_gym.plant.scene import swing_color
 
 Image = NDArray[Any]
@@ -30,10 +29,7 @@ class Stage:
         self._engine = engine
         self.model = copy.copy(engine.simulation.model)
         self.data = mujoco.MjData(self.model)
-        self._segments = [
-            self.model.geom(names.segment_geom(k)).id
-            for k in range(engine.config.beam.segment_count)
-        ]
+        self._geoms = engine.simulation.body.geoms(self.model)
         self._scene = mujoco.MjvScene(self.model, _MOST_GEOMS)
         self._options = mujoco.MjvOption()
         screen, quality = self.model.vis.global_, self.model.vis.quality
@@ -48,7 +44,7 @@ class Stage:
         """Take the pose of an episode, and the colour of its swing."""
         self._engine.simulation.materialize(index, self.model, self.data)
         sigma_rad = self._engine.config.sigma_rad
-        self.model.geom_rgba[self._segments] = swing_color(swing_rad, sigma_rad)
+        self.model.geom_rgba[self._geoms] = swing_color(swing_rad, sigma_rad)
 
     def photograph(
         self, camera: mujoco.MjvCamera, width: int, height: int, is_depth: bool

@@ -18,18 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from defmanip_gym.params import GRAVITY_M_S2, BeamParams, RobotParams
+from defmanip_gym.params import RobotParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.measured_force import ROD_SHARE
 from defmanip_gym.theory.dynamics.task_space import task_inertia
-from defmanip_gym.theory.payload.object_model import HangingBeam
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 _AXES = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class HangingObject:
-    """A beam about rest: b(z2) = −m_o12 m_o22⁻¹ (K φ + D φ̇) and how it follows the grasp.
+    """An object about rest: b(z2) = −m_o12 m_o22⁻¹ (K φ + D φ̇) and how it follows the grasp.
 
     Attributes:
         coupling: m_o12, (3, N) kg·m.
@@ -50,19 +50,17 @@ class HangingObject:
     levers: Array
 
     @classmethod
-    def of(cls, beam: BeamParams) -> HangingObject:
-        """Return that of a beam."""
-        model, rest = HangingBeam(beam), np.zeros(beam.segment_count)
-        partition = model.partition(rest, rest, np.zeros(()))
-        gravity = GRAVITY_M_S2 * np.diag(model.chain.constants.first_moments)
+    def of(cls, linear: LinearizedObject) -> HangingObject:
+        """Return that of an object."""
+        follows = np.asarray(np.linalg.solve(linear.m_o22, linear.m_o12.T), np.float64)
         return cls(
-            coupling=partition.m_o12,
-            apparent=model.apparent_inertia(partition),
-            follows=np.asarray(np.linalg.solve(partition.m_o22, partition.m_o12.T), np.float64),
-            stiffness=model.k_o22 + gravity,
-            damping=model.d_o22,
-            inertia=partition.m_o22,
-            levers=partition.m_o12 / beam.mass_kg,
+            coupling=linear.m_o12,
+            apparent=linear.m_o11 - linear.m_o12 @ follows,
+            follows=follows,
+            stiffness=linear.k_o22 + linear.gravity_stiffness,
+            damping=linear.d_o22,
+            inertia=linear.m_o22,
+            levers=linear.m_o12 / linear.m_o11[0, 0],
         )
 
     def force(self, ahead_s: float = 0.0) -> Array:
@@ -78,26 +76,28 @@ class ObservedLoop:
     Attributes:
         robot: true robot.
         goal_pitch: (2,) rad, arm pitches at the goal.
-        beam: true beam.
-        believed_beam: by the inner loop (28); None for the one that measures the force.
+        carried: true object.
+        believed: by the inner loop (28); None for the one that measures the force.
         tracking_gain: ε of Eq. (20), 1/s.
         approach_rate: speed of the velocity field per distance near the goal, 1/s.
         observer_gain: L, 1/s.
         following_rate: κ of swing following, 1/s.
         period_s: control period T.
         delay_periods: control periods until w takes effect.
+        inertia_shares: m̂ over the mass along each axis, a rod's by default.
     """
 
     robot: RobotParams
     goal_pitch: Array
-    beam: BeamParams
-    believed_beam: BeamParams | None
+    carried: LinearizedObject
+    believed: LinearizedObject | None
     tracking_gain: float
     approach_rate: float
     observer_gain: float
     following_rate: float
     period_s: float
     delay_periods: int = 0
+    inertia_shares: tuple[float, float, float] = (ROD_SHARE, 1.0, 1.0)
 
     def spectral_radius(self) -> float:
         """Return the largest |eigenvalue| over one sample; the loop is stable below 1."""
@@ -121,17 +121,17 @@ class ObservedLoop:
 
     def _maps(self) -> tuple[Array, Array]:
         """Return what the state and what the force sensor's noise become over a sample."""
-        true, half = HangingObject.of(self.beam), 0.5 * self.period_s
-        count = self.beam.segment_count
+        true, half = HangingObject.of(self.carried), 0.5 * self.period_s
+        count = self.carried.count
         size = 2 * _AXES + 2 * count
         M = task_inertia(self.robot, self.goal_pitch)
         compliance = np.linalg.inv(M + true.apparent)
         advance, forced = _held(true, -compliance @ true.force(), self.period_s)
-        if self.believed_beam is None:
-            weighed = self.beam.mass_kg * np.diag((ROD_SHARE, 1.0, 1.0))
+        if self.believed is None:
+            weighed = self.carried.m_o11[0, 0] * np.diag(self.inertia_shares)
             feeds, shown, seen = M + weighed, np.zeros((_AXES, 2 * count)), np.eye(_AXES)
         else:
-            believed = HangingObject.of(self.believed_beam)
+            believed = HangingObject.of(self.believed)
             feeds, shown = M + believed.apparent, believed.force(half)
             seen = weighed = np.zeros((_AXES, _AXES))
         step = self.period_s * self.observer_gain

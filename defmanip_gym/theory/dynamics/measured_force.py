@@ -130,6 +130,21 @@ def add_grasp_force_at(
     forward = force_b[i, 0] + mass * (ahead - c * along)
     left = force_b[i, 1] + mass * (w_left - acceleration_b[i, 1])
     up = force_b[i, 2] + mass * (above - s * along)
+    add_force_at(arm, forward, left, up, upper, fore, forces, i)
+
+
+@compilable
+def add_force_at(
+    arm: ArmLengths,
+    forward: float,
+    left: float,
+    up: float,
+    upper: float,
+    fore: float,
+    forces: Array,
+    i: int,
+) -> None:
+    """Add J_Aᵀ times a force at the grasp, base frame, to row i of ``forces``, (n, 4)."""
     reach, _ = reach_and_height(arm, upper, fore)
     rho_1, rho_2, z_1, z_2 = reach_and_height_slopes(arm, upper, fore)
     elbow = rho_2 * forward + z_2 * up

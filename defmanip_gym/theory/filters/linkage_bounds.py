@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 from scipy.optimize import minimize
 
 from defmanip_gym.compiled import compiled
@@ -110,7 +111,8 @@ def bounded(
     model = model._replace(
         yaw_inertia=found[4:5], yaw_momentum=found[3:4], passes=np.array([pass_j])
     )
-    return model, LinkageBounds(equilibrium, coordinate, found[:3], _slowest(model, equilibrium))
+    slowest_rad_s = float(linkage_modes(model, equilibrium)[0][0])
+    return model, LinkageBounds(equilibrium, coordinate, found[:3], slowest_rad_s)
 
 
 def _energy(model: LinkageModel, z2: Array) -> tuple[float, Array]:
@@ -222,12 +224,12 @@ def _quantities(seen: Seen, pass_j: float) -> Array:
     return np.concatenate((momenta, seen.yaw_inertia[:, None]), axis=1)
 
 
-def _slowest(model: LinkageModel, rest: Array) -> float:
-    """Return the lowest natural frequency about the equilibrium, rad/s."""
+def linkage_modes(model: LinkageModel, rest: Array) -> tuple[Array, Array]:
+    """Return natural frequencies, (N,) rad/s, ascending, and shapes, (N, N), about z2*."""
     step = 1e-5
     ahead = look(model, rest + step * np.eye(len(rest))).slope
     behind = look(model, rest - step * np.eye(len(rest))).slope
     stiffness = (ahead - behind) / (2 * step)
     matrix = look(model, rest[None]).matrix[0]
-    squares = np.linalg.eigvals(np.linalg.solve(matrix, 0.5 * (stiffness + stiffness.T))).real
-    return float(np.sqrt(max(squares.min(), 1e-12)))
+    squares, shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), matrix)
+    return np.sqrt(np.maximum(squares, 1e-12)), shapes

@@ -14,7 +14,7 @@ from defmanip_gym.task_params import TaskParams
 from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.dynamics.robot_model import reach_and_height_slopes
 from defmanip_gym.theory.filters.conditions import LARGEST_ERROR, FilterConditions
-from defmanip_gym.theory.filters.linkage_bounds import bounded
+from defmanip_gym.theory.filters.linkage_bounds import bounded, linkage_modes
 from defmanip_gym.theory.filters.linkage_storage import LinkageStorageRoom
 from defmanip_gym.theory.filters.safety_filter import BoolArray, FilterProof
 from defmanip_gym.theory.filters.sensed import Sensed
@@ -120,6 +120,14 @@ class ObjectStorageFilter(StorageKeeping):
     def specification(self) -> dict[str, Any]:
         """What the filter was made with, as JSON values."""
         return super().specification | {"linkage": plain_linkage(self.linkage)}
+
+    def modes(self) -> tuple[Array, Array]:
+        """Return natural frequencies, (N,) rad/s, ascending, and shapes, (N, N), about z2*."""
+        return linkage_modes(self._object, self.equilibrium)
+
+    def for_carried(self, carried: object) -> ObjectStorageFilter:
+        """Return this filter: it is for one object, known exactly."""
+        return self
 
     @property
     def offsets_m_s2(self) -> tuple[float, float, float]:

@@ -14,6 +14,7 @@ from defmanip_gym.theory.dynamics.chain import Array
 from defmanip_gym.theory.filters.conditions import FilterConditions, PayloadIntervals
 from defmanip_gym.theory.filters.reserves import (
     estimate_drift_rad,
+    hanging_modes,
     largest_momenta,
     reserved_shares,
 )
@@ -72,6 +73,7 @@ class StorageFilter(StorageKeeping):
         self.conditions = require_params("conditions", conditions, FilterConditions)
         self.intervals = require_params("intervals", intervals, PayloadIntervals)
         self.segment_count = self.beam.segment_count
+        self.equilibrium = np.zeros(self.segment_count)
         self._beams = StorageModel.of(self.intervals.corners(self.beam), self.sigma_rad)
         if self.conditions.delay_periods and len(self._beams.passes) > 1:
             raise CertificateError(
@@ -97,6 +99,14 @@ class StorageFilter(StorageKeeping):
     def for_beam(self, beam: BeamParams) -> Self:
         """Return the same filter for another beam, known exactly."""
         return self._with(beam=beam, intervals=PayloadIntervals())
+
+    def for_carried(self, carried: object) -> Self:
+        """Return the same filter for a beam, known exactly."""
+        return self.for_beam(require_params("carried", carried, BeamParams))
+
+    def modes(self) -> tuple[Array, Array]:
+        """Return natural frequencies, (N,) rad/s, ascending, and shapes, (N, N), about hanging."""
+        return hanging_modes(self.beam)
 
     def covers(self, carried: object) -> bool:
         """Whether it holds for this beam: the believed one within the intervals, however damped."""

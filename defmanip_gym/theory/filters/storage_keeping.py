@@ -72,10 +72,12 @@ class StorageKeeping(SafetyFilter):
         conditions: errors, noise and delay that it makes room for.
         pass_j: V_σ of what is believed to be carried, J.
         level_share: up to which share of V_σ the storage may rise.
+        equilibrium: z2*, (N,).
     """
 
     arguments: tuple[str, ...]  # of the constructor, each an attribute
     conditions: FilterConditions
+    equilibrium: Array
 
     def _prepare(self, model: CarriedModel, momenta: Array, room: CarriedRoom | None) -> None:
         """Make and compile what decisions need.
@@ -105,6 +107,14 @@ class StorageKeeping(SafetyFilter):
         self._advancing = self.setup  # with which model the state is moved through a delay
         self._compile()
         self._compile_decision()
+
+    @abstractmethod
+    def modes(self) -> tuple[Array, Array]:
+        """Return natural frequencies, (N,) rad/s, ascending, and shapes, (N, N), about z2*."""
+
+    @abstractmethod
+    def for_carried(self, carried: object) -> StorageKeeping:
+        """Return the same filter for what is carried, known exactly."""
 
     @abstractmethod
     def _reserved_shares(self) -> Array:

@@ -13,6 +13,7 @@ from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import suite_named
 from defmanip_gym.params import BeamParams, DisturbanceParams
+from defmanip_gym.payloads.rod import RodPayload
 
 ENV_ID = "defmanip_gym:DeformTransport-v0"
 MODULES = {"lqr": lqr, "shaped": shaped, "mpc": mpc}
@@ -66,7 +67,9 @@ def test_it_arrives_with_what_it_was_not_told(module, condition):
 
 
 def test_flexible_beams_are_carried_by_the_same_code(module):
-    config = TransportConfig(beam=BeamParams(segment_count=3), constraint_mode="cost")
+    config = TransportConfig(
+        payload=RodPayload(beam=BeamParams(segment_count=3)), constraint_mode="cost"
+    )
     found = records(module.make_controller(config), suite_named("nominal").scenarios[:2], config)
     assert all(record.success for record in found)
 
@@ -105,5 +108,5 @@ def test_an_episode_that_starts_knows_nothing_of_the_one_before(module):
 def test_it_says_what_it_depends_on(module):
     identity = module.make_controller(TransportConfig()).identity
     assert set(identity) >= {"params", "beam", "robot", "task"}
-    heavier = TransportConfig(beam=BeamParams(mass_kg=4.0))
+    heavier = TransportConfig(payload=RodPayload(beam=BeamParams(mass_kg=4.0)))
     assert identity != module.make_controller(heavier).identity

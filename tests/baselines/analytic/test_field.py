@@ -8,17 +8,18 @@ import pytest
 from defmanip_gym.baselines.analytic.field import FieldController, FieldParams, make_controller
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import GainError, ParameterError
-from defmanip_gym.evaluation.conditions import NOMINAL, NOMINAL_BEAM, Condition
+from defmanip_gym.evaluation.conditions import NOMINAL, Condition
 from defmanip_gym.evaluation.entry import Entry
 from defmanip_gym.evaluation.rollout import rollout
 from defmanip_gym.evaluation.suites import suite_named
 from defmanip_gym.params import BeamParams
+from defmanip_gym.payloads.rod import RodPayload
 
 MODEL = FieldParams(inner_loop="model")
 
 
 def records(condition, params=None, starts=4):
-    controller = FieldController(beam=NOMINAL_BEAM, params=params)
+    controller = FieldController(params=params)
     scenarios = suite_named("nominal").scenarios[:starts]
     episodes = rollout(
         Entry(suite="nominal", contestant="field", family="analytic"),
@@ -76,7 +77,7 @@ def test_it_is_made_for_the_inner_loop_that_measures_the_force():
 
 @pytest.mark.parametrize("segments", [1, 3, 8])
 def test_it_needs_no_other_gains_for_more_segments(segments):
-    FieldController(beam=BeamParams(segment_count=segments))
+    FieldController(payload=RodPayload(beam=BeamParams(segment_count=segments)))
 
 
 def test_gains_that_grow_and_values_without_sense_are_refused():

@@ -10,6 +10,7 @@ from defmanip_gym.baselines.analytic.tanner import TannerController, TannerParam
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.errors import CertificateError, GainError, ParameterError
 from defmanip_gym.params import DESIGN_DAMPING, PAPER_DISTURBANCE, BeamParams
+from defmanip_gym.payloads.rod import RodPayload
 from defmanip_gym.theory.certificates import TRANSPORT_CONDITIONS, CertificateConditions, certify
 from defmanip_gym.theory.control.control_laws import ForceLoopGains
 from defmanip_gym.wrappers.nu_max_scaling import NuMaxVectorActionScaling
@@ -143,7 +144,7 @@ def test_parameters_of_another_kind_are_refused(name, wrong):
 
 @pytest.mark.parametrize("segments", [2, 8, 16])
 def test_its_factory_finds_gains_for_beams_of_several_segments(segments):
-    config = TransportConfig(beam=BeamParams(segment_count=segments))
+    config = TransportConfig(payload=RodPayload(beam=BeamParams(segment_count=segments)))
     assert make_controller(config).sampled_loop().spectral_radius() < 1.0
 
 

@@ -3,6 +3,7 @@ import pytest
 
 from defmanip_gym.params import BeamParams, RobotParams
 from defmanip_gym.theory.control.observed_loop import ObservedLoop
+from defmanip_gym.theory.payload.zero_dynamics import linearize
 
 PERIOD_S = 0.02
 BEAM = BeamParams()
@@ -13,8 +14,8 @@ def loop(**changes):
         **{
             "robot": RobotParams(),
             "goal_pitch": np.array([np.pi / 2, 0.0]),
-            "beam": BEAM,
-            "believed_beam": None,
+            "carried": linearize(BEAM),
+            "believed": None,
             "tracking_gain": 4.0,
             "approach_rate": 4.0,
             "observer_gain": 5.0,
@@ -25,9 +26,9 @@ def loop(**changes):
     )
 
 
-@pytest.mark.parametrize("believed", [None, BeamParams(damping=0.0)])
+@pytest.mark.parametrize("believed", [None, linearize(BeamParams(damping=0.0))])
 def test_the_loop_stands_three_periods_of_delay_and_not_five(believed):
-    radii = [loop(believed_beam=believed, delay_periods=j).spectral_radius() for j in (0, 3, 5)]
+    radii = [loop(believed=believed, delay_periods=j).spectral_radius() for j in (0, 3, 5)]
     assert max(radii[:2]) < 1 < radii[2]
 
 
@@ -54,7 +55,7 @@ def test_the_observer_alone_is_stable_up_to_the_gain_that_its_delay_allows(delay
 @pytest.mark.parametrize("segments", [1, 4, 16])
 def test_no_mass_or_number_of_segments_makes_the_measured_force_unstable(factor, segments):
     beam = BeamParams(mass_kg=factor * BEAM.mass_kg, segment_count=segments)
-    assert loop(beam=beam).spectral_radius() < 1
+    assert loop(carried=linearize(beam)).spectral_radius() < 1
 
 
 def test_following_the_swing_multiplies_its_damping():
@@ -65,7 +66,7 @@ def test_following_the_swing_multiplies_its_damping():
 
 
 def test_only_the_loop_that_measures_the_force_passes_its_noise_on():
-    modelled = loop(believed_beam=BEAM).velocity_deviation(0.5)
+    modelled = loop(believed=linearize(BEAM)).velocity_deviation(0.5)
     measured = loop().velocity_deviation(0.5)
     np.testing.assert_array_equal(modelled, 0.0)
     assert (measured > 5e-4).all() and (measured < 5e-3).all()

@@ -1,4 +1,4 @@
-"""The beams of n episodes: drawn anew for each, if they are to differ."""
+"""The rods of n episodes: drawn anew for each, if they are to differ."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defmanip_gym.compiled import machine_code
-from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.envs.state_tree import fitted
-from defmanip_gym.params import BeamParams
+from defmanip_gym.params import BeamParams, BeamRanges
 from defmanip_gym.plant.simulation import Simulation
+from defmanip_gym.state_tree import fitted
 from defmanip_gym.theory.payload.object_model import HangingBeam, held_forces
 
 Array = NDArray[np.float64]
@@ -22,32 +21,37 @@ Ids = NDArray[np.intp]
 VARIED = ("damping", "mass_kg", "length_m")
 
 
-class CarriedBeams:
+class RodCargo:
     """What the simulations carry.
 
     Args:
-        config: the environment's definition, with the ranges to draw from.
+        beam: the given one.
+        ranges: to draw from.
         simulation: of the n episodes; its beams follow the draws.
         generators: one for each episode, looked up anew at every draw.
 
     Attributes:
+        told: names of ``values`` in ``info``.
         values: ``VARIED`` of each episode's beam, (3, n); replaced, never written.
     """
 
+    told = tuple(f"beam_{name}" for name in VARIED)
+
     def __init__(
         self,
-        config: TransportConfig,
+        beam: BeamParams,
+        ranges: BeamRanges,
         simulation: Simulation,
         generators: Sequence[np.random.Generator],
     ) -> None:
-        self._beam, self._ranges = config.beam, config.beam_ranges
+        self._beam, self._ranges = beam, ranges
         self._simulation, self._generators = simulation, generators
         count = simulation.count
         self._all = np.arange(count)
-        self._given = _rows([config.beam]).T
+        self._given = _rows([beam]).T
         self.values: Array = np.tile(self._given, count)
-        self._object = HangingBeam(config.beam)
-        segments = config.beam.segment_count
+        self._object = HangingBeam(beam)
+        segments = beam.segment_count
         self._room = np.empty((segments, segments)), np.empty(segments)
         self._held_forces = machine_code(
             held_forces,

@@ -1,0 +1,168 @@
+"""Any object from a MuJoCo model file: hinges, slides, tendons and springs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from defmanip_gym.errors import ObjectFileError
+from defmanip_gym.objects.mjcf_object import MjcfObject, mjcf_object
+from defmanip_gym.payloads.mjcf_cargo import MjcfCargo
+from defmanip_gym.payloads.payload import Coordinate, Payload
+from defmanip_gym.plant.held_object import HeldObject
+from defmanip_gym.plant.simulation import Simulation
+from defmanip_gym.theory.payload.linkage import Linkage
+from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MjcfPayload(Payload):
+    """An object from a file, held at a site of its root by a gripper that stays level.
+
+    Attributes:
+        path: MJCF file; see ``object_from_mjcf`` for what may be in it.
+        grasp_site: name of a site on the root body.
+
+    Raises:
+        ObjectFileError: the file is missing or invalid, holds no such object, or one that touches
+            itself at rest.
+    """
+
+    path: str
+    grasp_site: str = "grasp"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", str(Path(self.path)))
+        _require_no_contact(self.thing)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path, "grasp_site": self.grasp_site}
+
+    @cached_property
+    def thing(self) -> MjcfObject:
+        """The object, linearized."""
+        return mjcf_object(self.path, grasp_site=self.grasp_site)
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The file's joints in their order."""
+        held, rest = self.thing.object_file.held, self.thing.linear.equilibrium
+        units = ["m" if kind == 2 else "rad" for kind in held.jnt_type]
+        return tuple(
+            Coordinate(name=name, unit=unit, rest=float(at))
+            for name, unit, at in zip(self.linear.coordinates, units, rest, strict=True)
+        )
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """The file's contents, wherever it lies, and the site."""
+        digest = hashlib.sha256(Path(self.path).read_bytes()).hexdigest()
+        return {"payload": {"mjcf": digest, "grasp_site": self.grasp_site}}
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """The same."""
+        return self.identity
+
+    @property
+    def linear(self) -> LinearizedObject:
+        """Of the file's object."""
+        return self.thing.linear
+
+    @property
+    def mass_kg(self) -> float:
+        """Of the whole object."""
+        return self.thing.object_file.mass_kg
+
+    @property
+    def carried(self) -> tuple[Linkage]:
+        """The object as links.
+
+        Raises:
+            ObjectFileError: it has springs that links do not.
+        """
+        return (self.linkage,)
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """The same."""
+        return self.thing.linkage()
+
+    @property
+    def extremes(self) -> tuple[MjcfPayload]:
+        """It alone."""
+        return (self,)
+
+    @property
+    def slowest_rad_s(self) -> float:
+        """Of the linearized object."""
+        return float(np.sqrt(self._modes[0][0]))
+
+    @property
+    def believed(self) -> None:
+        """Nothing: its force is felt."""
+        return None
+
+    @property
+    def is_hinged(self) -> bool:
+        """It may hang in any way."""
+        return False
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array]:
+        """Squared frequencies, increasing, and shapes in columns, of small motions."""
+        linear = self.thing.linear
+        stiffness = linear.k_o22 + linear.gravity_stiffness
+        squares, shapes = scipy.linalg.eigh((stiffness + stiffness.T) / 2, linear.m_o22)
+        return squares, shapes
+
+    def body(self) -> HeldObject:
+        """Return how MuJoCo holds it."""
+        return HeldObject(self.thing.object_file)
+
+    def cargo(self, simulation: Simulation, generators: Sequence[np.random.Generator]) -> MjcfCargo:
+        """Return the objects of n episodes."""
+        return MjcfCargo(self.thing, simulation.count)
+
+    def swung(self, swing_rad: Array) -> Array:
+        """Return objects out of the equilibrium along what accelerating forward bends first.
+
+        The coordinate that is largest in it is as far out as the swing says.
+        """
+        linear = self.thing.linear
+        _, shapes = self._modes
+        pushed = np.abs(shapes.T @ linear.m_o12[0]) > 1e-9 * np.abs(linear.m_o12).max(initial=0.0)
+        shape = shapes[:, int(np.argmax(pushed))]
+        shape = shape / shape[np.argmax(np.abs(shape))]
+        return linear.equilibrium + swing_rad[:, None] * shape
+
+
+def _require_no_contact(thing: MjcfObject) -> None:
+    """Refuse an object that touches itself at rest: contacts are off where it is carried."""
+    model = thing.object_file.held
+    data = mujoco.MjData(model)
+    data.qpos[:] = thing.linear.equilibrium
+    mujoco.mj_forward(model, data)
+    for contact in data.contact:
+        one, other = (int(model.geom_bodyid[geom]) for geom in contact.geom)
+        joined = model.body_parentid[one] == other or model.body_parentid[other] == one
+        if contact.dist >= 0 or joined:  # neighbours overlap at their joint
+            continue
+        bodies = [model.body(body).name for body in (one, other)]
+        raise ObjectFileError(
+            "contacts at rest",
+            " and ".join(repr(name) for name in bodies),
+            "an object whose parts do not touch one another as it hangs",
+            "Part them, or give geoms that are only drawn contype='0' conaffinity='0'.",
+        )

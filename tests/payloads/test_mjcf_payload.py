@@ -1,0 +1,190 @@
+"""Objects from files are carried as rods are: same faces, same controllers, errors that help."""
+
+import pickle
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import defmanip_gym.objects
+from defmanip_gym.baselines.analytic.field import make_controller
+from defmanip_gym.baselines.analytic.lqr import make_controller as make_lqr
+from defmanip_gym.envs.deform_transport import DeformTransportEnv
+from defmanip_gym.envs.state import get_state, set_state
+from defmanip_gym.envs.vector import DeformTransportVectorEnv
+from defmanip_gym.errors import ObjectFileError, ParameterError, PayloadError
+from defmanip_gym.params import BeamParams
+from defmanip_gym.payloads.mjcf import MjcfPayload
+from defmanip_gym.payloads.rod import RodPayload
+
+EXAMPLES = Path(defmanip_gym.objects.__file__).parent / "examples"
+NAMES = ("bucket", "hose", "spherical")
+FELT = {"inner_loop": "measured_force", "constraint_mode": "cost"}
+
+# the reference rod; across = m l²/12, along = m r²/2
+ROD = """
+<mujoco><compiler angle="radian"/><worldbody><body name="root" pos="0 0 1">
+  <inertial pos="0 0 0" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/><site name="grasp"/>
+  <body name="rod"><joint name="swing" axis="0 -1 0" damping="0.1"/>
+    <inertial pos="0 0 -0.3" mass="3.1153" diaginertia="0.093459 0.093459 0.00062306"/>
+    {more}
+  </body>
+</body></worldbody></mujoco>
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(text):
+        path = tmp_path / "object.xml"
+        path.write_text(text)
+        return str(path)
+
+    return written
+
+
+def example(name):
+    return MjcfPayload(path=str(EXAMPLES / f"{name}.xml"))
+
+
+def batch(payload, count=4, **changes):
+    return DeformTransportVectorEnv(
+        count, payload=payload, num_threads=1, autoreset_mode="Disabled", **FELT | changes
+    )
+
+
+def driven(env, steps, seed=0):
+    rng = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    actions = rng.uniform(-0.5, 0.5, (steps, *env.action_space.shape))
+    return np.array([env.step(action)[0] for action in actions])
+
+
+def test_a_rod_from_a_file_moves_like_the_rod_that_is_compiled(write):
+    payloads = RodPayload(), MjcfPayload(path=write(ROD.format(more="")))
+    rod, file = (driven(batch(payload), 100) for payload in payloads)
+    force = batch(payloads[0], 1).engine.layout.slices["grasp_force_b"]
+    np.testing.assert_allclose(file[..., force], rod[..., force], atol=0.5)
+    np.testing.assert_allclose(
+        np.delete(file, force, axis=-1), np.delete(rod, force, axis=-1), atol=6e-3
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_episode_goes_as_in_a_batch(name):
+    single = DeformTransportEnv(payload=example(name), **FELT)
+    np.testing.assert_array_equal(driven(single, 20), driven(batch(example(name), 1), 20)[:, 0])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_grasp_accelerates_as_it_is_asked_to(name):
+    env = batch(example(name), 1)
+    env.reset(options={"start": "paper"})
+    asked = np.array([[0.3, 0.0, -0.1]])
+    for _ in range(25):
+        observation, *_ = env.step(asked)
+    reached = env.engine.layout.part(observation, "grasp_velocity_b")
+    np.testing.assert_allclose(reached, asked * 3.0 * 0.5, atol=0.02)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_first_reading_is_what_holding_it_takes(name):
+    env = batch(example(name), 2)
+    observation, _ = env.reset(seed=1)
+    simulation = env.engine.simulation
+    heavy = np.full((2, 4), 0.0)
+    first = env.engine.layout.part(observation, "grasp_force_b")
+    weight = example(name).thing.object_file.mass_kg * 9.81
+    assert np.all(np.abs(first[:, 2] - weight) < 0.02 * weight)
+    simulation.hold(np.arange(2), heavy)  # falling, it weighs less
+    assert np.all(simulation.read().grasp_force_b[:, 2] < first[:, 2])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_field_brings_it_to_the_goal(name):
+    env = batch(example(name))
+    controller, state = make_controller(env.unwrapped.config), None
+    observation, _ = env.reset(seed=0)
+    arrived = np.zeros(4, dtype=bool)
+    for _ in range(600):
+        action, state = controller.predict(observation, state)
+        observation, _, _, _, info = env.step(action)
+        arrived |= info["is_success"]
+        if arrived.all():
+            break
+    assert arrived.all()
+
+
+def test_a_state_is_gone_on_from_to_the_last_bit():
+    one, other = batch(example("spherical")), batch(example("spherical"))
+    driven(one, 10)
+    state = get_state(one)
+    action = np.full((4, 3), 0.2)
+    expected = [one.step(action)[0] for _ in range(5)]
+    other.reset(seed=9)
+    set_state(other, state)
+    np.testing.assert_array_equal([other.step(action)[0] for _ in range(5)], expected)
+
+
+def test_it_is_made_from_the_mapping_that_a_specification_holds(tmp_path):
+    arguments = {"payload": {"path": str(EXAMPLES / "hose.xml")}, **FELT}
+    env = gymnasium.make("defmanip_gym:DeformTransport-v0", disable_env_checker=True, **arguments)
+    assert env.observation_space.shape == (20 + 2 * 4,)
+    assert env.unwrapped.config.payload == example("hose")
+    copy = pickle.loads(pickle.dumps(example("hose")))
+    assert copy == example("hose") and copy.linear.count == 4
+
+
+def test_coordinates_tell_names_units_and_rest():
+    slide, swing = example("bucket").coordinates
+    assert (slide.name, slide.unit, swing.name, swing.unit) == ("slide", "m", "swing", "rad")
+
+
+def test_images_show_it(opengl):
+    env = DeformTransportEnv(payload=example("spherical"), render_mode="rgb_array", **FELT)
+    env.reset(options={"start": "paper"})
+    calm = env.render_camera("grasp").astype(int)
+    env.reset(options={"start": (-8.5, 5.5, 0.0, np.pi / 3, -np.pi / 2, 0.5)})
+    swung = env.render_camera("grasp").astype(int)
+    red = [(image[..., 0] - image[..., 1] > 60).sum() for image in (calm, swung)]
+    assert red[1] > red[0] + 50
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        (ROD.format(more="").replace("3.1153", "40"), PayloadError, "largest"),
+        (ROD.format(more="").replace('name="grasp"', 'name="handle"'), ObjectFileError, "handle"),
+        (ROD.format(more="").replace("0 0 -0.3", "0 0 0.3"), ObjectFileError, "stable"),
+        (ROD.format(more="").replace("axis", 'type="free" axis'), ObjectFileError, ""),
+    ],
+    ids=["heavy", "no site", "upside down", "free joint"],
+)
+def test_what_cannot_be_carried_is_refused_with_a_remedy(text, error, words, write):
+    with pytest.raises(error, match=words):
+        batch(MjcfPayload(path=write(text)))
+
+
+def test_an_object_that_touches_itself_at_rest_is_refused(write):
+    ball = '<geom type="sphere" size="0.1" pos="0 0 -0.02" mass="0.1"/>'
+    nested = f"""
+      <geom type="sphere" size="0.1" pos="0 0 -0.4" mass="0.1"/>
+      <body pos="0 0 -0.3"><joint name="a" axis="0 -1 0" damping="0.1"/>
+        <geom size="0.01" mass="0.1" pos="0 0 -0.3"/>
+        <body pos="0 0 -0.1"><joint name="b" axis="0 -1 0" damping="0.1"/>{ball}</body></body>"""
+    with pytest.raises(ObjectFileError, match="touch"):
+        MjcfPayload(path=write(ROD.format(more=nested)))
+
+
+def test_what_a_payload_excludes_is_said():
+    hose = example("hose")
+    with pytest.raises(ParameterError, match="measured_force"):
+        DeformTransportEnv(payload=hose)
+    with pytest.raises(ParameterError, match="either"):
+        DeformTransportEnv(payload=hose, beam=BeamParams(mass_kg=1.0), **FELT)
+    with pytest.raises(ParameterError, match="MjcfPayload"):
+        DeformTransportEnv(payload="hose.xml", **FELT)
+    with pytest.raises(PayloadError, match="rod"):
+        make_lqr(DeformTransportEnv(payload=hose, **FELT).config)
