@@ -24,8 +24,10 @@ def require_carriable(config: TransportConfig) -> None:
     """
     if config.payload.is_hinged:
         return
+    _require_straight(config)
     _require_strength(config)
-    _require_stability(config)
+    if config.control_mode == "task":
+        _require_stability(config)
 
 
 def _arms(config: TransportConfig) -> Array:
@@ -34,6 +36,19 @@ def _arms(config: TransportConfig) -> Array:
     center, spread = np.array(start.center[3:5]), np.array(start.spread[3:5])
     corners = center + spread * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
     return np.vstack((np.array(config.task.goal[3:5]), corners))
+
+
+def _require_straight(config: TransportConfig) -> None:
+    """Look at where it hangs: success is counted from its coordinates' zero, and so is σ."""
+    rest = max(config.payload.coordinates, key=lambda each: abs(each.rest))
+    tolerance = min(config.task.swing_tolerance_rad, config.sigma_rad)
+    if abs(rest.rest) >= tolerance:
+        raise PayloadError(
+            f"equilibrium of {rest.name!r}, {rest.unit}",
+            rest.rest,
+            f"within task.swing_tolerance_rad and sigma_rad of zero, {tolerance:g}",
+            "Build the object as it hangs, or allow more.",
+        )
 
 
 def _require_strength(config: TransportConfig) -> None:
@@ -66,9 +81,9 @@ def _require_stability(config: TransportConfig) -> None:
     """Look at what is left of an error of acceleration after a sample (docs/derivations.md)."""
     linear = config.payload.linear
     apparent = linear.m_o11 - linear.m_o12 @ np.linalg.solve(linear.m_o22, linear.m_o12.T)
-    weighed = np.diag(config.payload.mass_kg * np.array(config.payload.inertia_shares))
+    weighed = np.diag(config.payload.felt_inertia_kg)
     pitch = _arms(config) @ JOINT_TO_PITCH.T
-    inertia = task_inertia(config.believed_robot, pitch)
+    inertia = task_inertia(config.robot, pitch)
     left = np.linalg.solve(inertia + apparent, np.broadcast_to(apparent - weighed, inertia.shape))
     radius = float(np.abs(np.linalg.eigvals(left)).max())
     if radius >= 1.0:

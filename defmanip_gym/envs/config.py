@@ -74,7 +74,8 @@ class TransportConfig:
                 "Narrow its spread or raise sigma_rad.",
             )
         object.__setattr__(self, "payload", require_payload("payload", self.payload))
-        if self.payload.believed is None and self.inner_loop == "model":
+        needs_rod = self.control_mode == "task" and self.inner_loop == "model"
+        if needs_rod and self.payload.believed is None:
             raise ParameterError(
                 "inner_loop",
                 self.inner_loop,

@@ -80,6 +80,9 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | 16-18 | grasp_force_b    | measured force on the object           | N          |
     | 19-21 | near_offset_b    | tanh of goal_offset_b over 0.5 m       | -          |
 
+    Of a `payload` from a file, swing and swing_rate are its joint positions and rates, rad or m; φ and
+    σ in what follows then stand for these, and `info` has no `beam_` entries.
+
     ## Rewards
     The sum of the terms below, each also in `info`; the first four are differences of potentials.
     d is the planar plus the vertical distance of the grasp to the goal, ψ the angle between the
@@ -142,7 +145,7 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | beam_ranges     | none (`BeamRanges()`) | damping, mass, length to draw each episode from   |
     | nominal_robot   | `None`           | robot of the feedback linearization; the true one      |
     | nominal_beam    | `None`           | its beam; `beam` with no damping at the root           |
-    | payload         | `None`           | what is carried instead of a beam: `MjcfPayload(...)`   |
+    | payload         | `None`           | what is carried instead of a beam: `MjcfPayload(...)`  |
     | task            | `TaskParams()`   | goal, starts, limits, tolerances, rewards              |
     | disturbance     | none (`DisturbanceParams()`) | force sinusoid, bias, sensor noise         |
     | disturbance_ranges | none (`DisturbanceRanges()`) | of these, to draw each episode from |

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
@@ -117,7 +118,9 @@ def frames_per_second(config: TransportConfig) -> int:
 
 
 def _without_numpy(value: Any) -> Any:
-    """Return arguments with Python's own numbers and lists, as JSON has no others."""
+    """Return arguments with Python's own numbers, lists and texts, as JSON has no others."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, np.ndarray | np.generic):

@@ -63,7 +63,10 @@ class FeltForce:
         self._note = machine_code(_note, loop, plant, plant, np.empty((count, 3)), self._felt)
 
     def begin(self, ids: Ids, force_b: Array, swing: Array) -> None:
-        """Weigh the objects of episodes that begin at rest; arguments as for ``Felt.at_rest``."""
+        """Weigh the rods of episodes that begin at rest; arguments as for ``Felt.at_rest``.
+
+        What others show of their mass is their file's: swung against springs, they weigh wrong.
+        """
         hanging = swing[ids] if self._loop.is_hinged else np.zeros((len(ids), 1))
         for own, new in zip(self._felt, Felt.at_rest(force_b[ids], hanging), strict=True):
             own[ids] = new
@@ -115,12 +118,12 @@ def _add(loop: LoopConstants, actions: Array, plant: PlantState, felt: Felt, for
                 i,
             )
         else:
-            mass, late = felt.mass_kg[i], felt.acceleration_b
+            late = felt.acceleration_b
             add_force_at(
                 loop.model.arm,
-                felt.force_b[i, 0] + mass * loop.shares.forward * (w_forward - late[i, 0]),
-                felt.force_b[i, 1] + mass * loop.shares.left * (w_left - late[i, 1]),
-                felt.force_b[i, 2] + mass * loop.shares.up * (w_up - late[i, 2]),
+                felt.force_b[i, 0] + loop.inertia.forward * (w_forward - late[i, 0]),
+                felt.force_b[i, 1] + loop.inertia.left * (w_left - late[i, 1]),
+                felt.force_b[i, 2] + loop.inertia.up * (w_up - late[i, 2]),
                 upper,
                 fore,
                 forces,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from defmanip_gym.compiled import compilable, compiled, machine_code
 from defmanip_gym.envs.config import TransportConfig
 from defmanip_gym.envs.felt_force import Felt, FeltForce
-from defmanip_gym.envs.task_command import InertiaShares, LoopConstants, task_command
+from defmanip_gym.envs.task_command import FeltInertia, LoopConstants, task_command
 from defmanip_gym.errors import ActionError
 from defmanip_gym.plant.plant_state import PlantState
 from defmanip_gym.theory.dynamics.feedback_linearization import (
@@ -44,8 +45,10 @@ class InnerLoop:
         self._force_limits = np.array(config.robot.force_limits)
         reach_m, _ = config.goal_reach_and_height_m
         measures_force = config.inner_loop == "measured_force"
+        robot = config.believed_robot
+        turned = config.payload.yaw_inertia_kgm2  # turns with the base, which feels it as its own
         linearization = FeedbackLinearization(
-            config.believed_robot,
+            replace(robot, base_yaw_inertia_kgm2=robot.base_yaw_inertia_kgm2 + turned),
             None if measures_force else config.payload.believed,
             RedundancyResolution(config.believed_robot, goal_reach_m=reach_m),
         )
@@ -56,7 +59,7 @@ class InnerLoop:
             period_s=task.control_period_s,
             arm=ArmLengths.of(config.robot),
             is_hinged=config.payload.is_hinged,
-            shares=InertiaShares(*config.payload.inertia_shares),
+            inertia=FeltInertia(*config.payload.felt_inertia_kg),
         )
         actions = np.empty(self._shape)
         segments = config.payload.count

@@ -140,7 +140,7 @@ def check_starts(starts: Array, config: TransportConfig) -> None:
     upper, fore = starts[:, 3], starts[:, 3] + starts[:, 4]
     inside = in_workspace(starts[:, 0], starts[:, 1], upper, fore, workspace_of(config))
     inside &= np.abs(starts[:, 2]) < _LARGEST_HEADING_RAD
-    within = np.abs(starts[:, 5]) <= config.sigma_rad
+    within = np.abs(config.payload.swung(starts[:, 5])).max(axis=1) <= config.sigma_rad
     for start, reachable, straight in zip(starts, inside, within, strict=True):
         if not reachable:
             raise StartError(

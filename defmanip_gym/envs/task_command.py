@@ -16,8 +16,8 @@ from defmanip_gym.theory.dynamics.robot_model import ArmLengths, grasp_velocity
 Array = NDArray[np.float64]
 
 
-class InertiaShares(NamedTuple):
-    """Which shares of an object's mass its grasp accelerates forward, to the left and upwards."""
+class FeltInertia(NamedTuple):
+    """m̂ of an object from a file, diag(m̃_o11) at rest, kg: forward, to the left and upwards."""
 
     forward: float
     left: float
@@ -33,7 +33,7 @@ class LoopConstants(NamedTuple):
     period_s: float
     arm: ArmLengths
     is_hinged: bool
-    shares: InertiaShares
+    inertia: FeltInertia
 
 
 @compilable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from defmanip_gym.errors import ParameterError
@@ -33,13 +34,19 @@ def payload_of(
     """
     if payload is None:
         return RodPayload(beam=beam, beam_ranges=beam_ranges, nominal_beam=nominal_beam)  # type: ignore[arg-type]
-    if (beam, beam_ranges, nominal_beam) != (BeamParams(), BeamRanges(), None):
-        raise ParameterError(
-            "beam",
-            beam,
-            "the default beside a payload: beam, beam_ranges and nominal_beam make a rod",
-            "Pass either a payload or a beam.",
-        )
+    for name, value, default in (
+        ("beam", beam, BeamParams()),
+        ("beam_ranges", beam_ranges, BeamRanges()),
+        ("nominal_beam", nominal_beam, None),
+    ):
+        if value != default:
+            raise ParameterError(
+                name,
+                value,
+                f"{default!r} beside a payload: beam, beam_ranges and nominal_beam make a rod",
+                "Pass either a payload or a rod's arguments; ids that draw rods need "
+                "beam_ranges=BeamRanges().",
+            )
     return require_payload("payload", payload)
 
 
@@ -50,8 +57,9 @@ def require_payload(name: str, value: object) -> Payload:
         ParameterError: neither of them.
     """
     if isinstance(value, Mapping):
-        kind = MjcfPayload if "path" in value else RodPayload
-        return require_params(name, value, kind)
+        if set(value) <= {field.name for field in fields(RodPayload)}:
+            return require_params(name, value, RodPayload)
+        return require_params(name, value, MjcfPayload)
     if not isinstance(value, Payload):
         raise ParameterError(
             name, value, "a Payload or its fields", "As in MjcfPayload(path=..., grasp_site=...)."

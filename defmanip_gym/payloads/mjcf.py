@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,45 +15,67 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from defmanip_gym.errors import ObjectFileError
+from defmanip_gym.errors import ObjectFileError, ParameterError
+from defmanip_gym.objects.internal_forces import YAW, InternalForces
 from defmanip_gym.objects.mjcf_object import MjcfObject, mjcf_object
 from defmanip_gym.payloads.mjcf_cargo import MjcfCargo
 from defmanip_gym.payloads.payload import Coordinate, Payload
 from defmanip_gym.plant.held_object import HeldObject
 from defmanip_gym.plant.simulation import Simulation
-from defmanip_gym.theory.payload.linkage import Linkage
+from defmanip_gym.theory.payload.linkage import HeldLinkage, Linkage
 from defmanip_gym.theory.payload.zero_dynamics import LinearizedObject
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class MjcfPayload(Payload):
     """An object from a file, held at a site of its root by a gripper that stays level.
+
+    It is read once, and stays what it was then, whatever becomes of the file; two of them are the
+    same if MuJoCo compiles the same from them and they are held at the same site.
 
     Attributes:
         path: MJCF file; see ``object_from_mjcf`` for what may be in it.
         grasp_site: name of a site on the root body.
 
     Raises:
+        ParameterError: no path, or no name.
         ObjectFileError: the file is missing or invalid, holds no such object, or one that touches
-            itself at rest.
+            itself at rest or that something holds against gravity.
     """
 
     path: str
     grasp_site: str = "grasp"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "path", str(Path(self.path)))
+        for name, kinds in (("path", (str, os.PathLike)), ("grasp_site", (str,))):
+            value = getattr(self, name)
+            if not isinstance(value, kinds) or value == "":
+                raise ParameterError(name, value, "a text", "As in path='hose.xml'.")
+        path = Path(os.fspath(self.path)).expanduser().absolute()
+        object.__setattr__(self, "path", str(path))
         _require_no_contact(self.thing)
+        _require_weight(self.thing)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path, "grasp_site": self.grasp_site}
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, MjcfPayload) and self.identity == other.identity
+
+    def __hash__(self) -> int:
+        return hash((self.digest, self.grasp_site))
 
     @cached_property
     def thing(self) -> MjcfObject:
         """The object, linearized."""
         return mjcf_object(self.path, grasp_site=self.grasp_site)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of what MuJoCo made of the file, and of what that includes."""
+        held = self.thing.object_file.held
+        content = np.empty(mujoco.mj_sizeModel(held), dtype=np.uint8)
+        mujoco.mj_saveModel(held, None, content)
+        return hashlib.sha256(content.tobytes()).hexdigest()
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -66,9 +89,8 @@ class MjcfPayload(Payload):
 
     @property
     def identity(self) -> dict[str, Any]:
-        """The file's contents, wherever it lies, and the site."""
-        digest = hashlib.sha256(Path(self.path).read_bytes()).hexdigest()
-        return {"payload": {"mjcf": digest, "grasp_site": self.grasp_site}}
+        """What the file compiled to, wherever it lies, and the site."""
+        return {"payload": {"mjcf": self.digest, "grasp_site": self.grasp_site}}
 
     @property
     def known(self) -> dict[str, Any]:
@@ -86,13 +108,13 @@ class MjcfPayload(Payload):
         return self.thing.object_file.mass_kg
 
     @property
-    def carried(self) -> tuple[Linkage]:
-        """The object as links.
+    def carried(self) -> tuple[HeldLinkage]:
+        """The object as links, and its mass.
 
         Raises:
             ObjectFileError: it has springs that links do not.
         """
-        return (self.linkage,)
+        return (HeldLinkage(self.linkage, self.mass_kg),)
 
     @cached_property
     def linkage(self) -> Linkage:
@@ -103,6 +125,12 @@ class MjcfPayload(Payload):
     def extremes(self) -> tuple[MjcfPayload]:
         """It alone."""
         return (self,)
+
+    @cached_property
+    def yaw_inertia_kgm2(self) -> float:
+        """About the vertical through the grasp, at rest."""
+        matrix = InternalForces(self.thing.object_file).mass_matrix(self.linear.equilibrium)
+        return float(matrix[YAW, YAW])
 
     @property
     def slowest_rad_s(self) -> float:
@@ -155,8 +183,8 @@ def _require_no_contact(thing: MjcfObject) -> None:
     data.qpos[:] = thing.linear.equilibrium
     mujoco.mj_forward(model, data)
     for contact in data.contact:
-        one, other = (int(model.geom_bodyid[geom]) for geom in contact.geom)
-        joined = model.body_parentid[one] == other or model.body_parentid[other] == one
+        one, other = (int(model.body_weldid[model.geom_bodyid[geom]]) for geom in contact.geom)
+        joined = _above(model, one) == other or _above(model, other) == one
         if contact.dist >= 0 or joined:  # neighbours overlap at their joint
             continue
         bodies = [model.body(body).name for body in (one, other)]
@@ -165,4 +193,20 @@ def _require_no_contact(thing: MjcfObject) -> None:
             " and ".join(repr(name) for name in bodies),
             "an object whose parts do not touch one another as it hangs",
             "Part them, or give geoms that are only drawn contype='0' conaffinity='0'.",
+        )
+
+
+def _above(model: mujoco.MjModel, body: int) -> int:
+    """Return what a joint hangs a body from: the first of those that are rigidly one."""
+    return int(model.body_weldid[model.body_parentid[body]])
+
+
+def _require_weight(thing: MjcfObject) -> None:
+    """Refuse what gravity does not pull as the sensor at the grasp says."""
+    if thing.object_file.held.body_gravcomp.any():
+        raise ObjectFileError(
+            "gravcomp",
+            thing.object_file.held.body_gravcomp.tolist(),
+            "0 in all bodies of what is carried",
+            "What holds a body up would not be felt at the grasp: remove it, or lower its mass.",
         )

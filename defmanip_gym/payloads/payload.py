@@ -113,13 +113,17 @@ class Payload(ABC):
         """Angular frequency of the slowest small motion about the equilibrium."""
 
     @property
-    def inertia_shares(self) -> tuple[float, float, float]:
-        """Diagonal of m̃_o11 over the mass: forward, left, up. What it weighs does not matter."""
+    def felt_inertia_kg(self) -> tuple[float, float, float]:
+        """m̂ that the loop around the measured force puts in, forward, left, up: diag(m̃_o11)."""
         linear = self.linear
         follows = np.linalg.solve(linear.m_o22, linear.m_o12.T)
-        shown = np.diag(linear.m_o11 - linear.m_o12 @ follows) / linear.m_o11[0, 0]
-        forward, left, up = shown.tolist()
+        forward, left, up = np.diag(linear.m_o11 - linear.m_o12 @ follows).tolist()
         return forward, left, up
+
+    @property
+    @abstractmethod
+    def yaw_inertia_kgm2(self) -> float:
+        """About the vertical through the grasp, at rest, as far as the base reckons with it."""
 
     @property
     @abstractmethod

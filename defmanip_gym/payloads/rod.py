@@ -103,9 +103,15 @@ class RodPayload(Payload):
         return math.sqrt(1.5 * GRAVITY_M_S2 / self.beam.length_m)
 
     @property
-    def inertia_shares(self) -> tuple[float, float, float]:
-        """As of one uniform rod, however many segments there are."""
-        return ROD_SHARE, 1.0, 1.0
+    def felt_inertia_kg(self) -> tuple[float, float, float]:
+        """As of one uniform rod, however many segments there are; in episodes with its weight."""
+        mass_kg = self.beam.mass_kg
+        return ROD_SHARE * mass_kg, mass_kg, mass_kg
+
+    @property
+    def yaw_inertia_kgm2(self) -> float:
+        """None to speak of: it hangs."""
+        return 0.0
 
     @property
     def believed(self) -> BeamParams:

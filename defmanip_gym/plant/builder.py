@@ -41,6 +41,7 @@ def build_model(
     """
     spec = mujoco.MjSpec()
     spec.modelname = "deform_transport"
+    spec.compiler.degree = False  # as objects from files are compiled
     spec.option.timestep = physics_period_s
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_S2]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE

@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from defmanip_gym.envs.config import TransportConfig
-from defmanip_gym.errors import CertificateError
+from defmanip_gym.errors import CertificateError, ObjectFileError
 from defmanip_gym.theory.filters.nu_max_filter import NuMaxFilter
 from defmanip_gym.theory.filters.safety_filter import SafetyFilter
 from defmanip_gym.theory.filters.storage_keeping import StorageKeeping
@@ -78,7 +78,11 @@ class Applicability(Promise):
     @cached_property
     def configuration_reason(self) -> str:
         """Why the promise covers no episode of this environment; empty if it may."""
-        if not all(map(self._filter.covers, self._config.payload.carried)):
+        try:
+            carried = self._config.payload.carried
+        except ObjectFileError as error:
+            return f"it was not computed for what is carried: {error}"
+        if not all(map(self._filter.covers, carried)):
             return "it was not computed for what is carried"
         if self._filter.proof == "none":
             return f"what {self._terms.method!r} allows is not proven"

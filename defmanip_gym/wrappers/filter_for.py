@@ -102,7 +102,7 @@ def _with_room(config: TransportConfig, made: _Made) -> _Made:
     require_fit(config, made)
     for _ in range(_ROUNDS):
         found, given = filter_errors(config, made), made.conditions
-        if max(found.acceleration_m_s2) > _HOPELESS_M_S2:
+        if max(found.acceleration_m_s2) > _HOPELESS_M_S2 or _SPARE * found.storage >= 1.0:
             break
         needed = _provided(found, given)
         if all(size <= getattr(given, name) for name, size in needed.items()):

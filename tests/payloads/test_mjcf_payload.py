@@ -13,7 +13,7 @@ from defmanip_gym.baselines.analytic.lqr import make_controller as make_lqr
 from defmanip_gym.envs.deform_transport import DeformTransportEnv
 from defmanip_gym.envs.state import get_state, set_state
 from defmanip_gym.envs.vector import DeformTransportVectorEnv
-from defmanip_gym.errors import ObjectFileError, ParameterError, PayloadError
+from defmanip_gym.errors import ObjectFileError, ParameterError, PayloadError, StartError
 from defmanip_gym.params import BeamParams
 from defmanip_gym.payloads.mjcf import MjcfPayload
 from defmanip_gym.payloads.rod import RodPayload
@@ -188,3 +188,118 @@ def test_what_a_payload_excludes_is_said():
         DeformTransportEnv(payload="hose.xml", **FELT)
     with pytest.raises(PayloadError, match="rod"):
         make_lqr(DeformTransportEnv(payload=hose, **FELT).config)
+
+
+def still(payload, steps=50):
+    """Return observations of an episode that begins at rest and is asked to stay so."""
+    env = batch(payload, 1)
+    env.reset(options={"start": "paper"})
+    return np.array([env.step(np.zeros((1, 3)))[0][0] for _ in range(steps)]), env
+
+
+@pytest.mark.parametrize("offset", ['ref="0.02"', 'springref="0.03" stiffness="40"'])
+def test_offsets_of_joints_are_radians_in_the_plant_too(offset, write):
+    payload = MjcfPayload(path=write(ROD.format(more="").replace("axis", f"{offset} axis")))
+    observations, env = still(payload)
+    swing = env.engine.layout.part(observations, "swing")
+    (rest,) = (coordinate.rest for coordinate in payload.coordinates)
+    np.testing.assert_allclose(swing, rest, atol=2e-3)
+    (address,) = env.engine.simulation.model.joint("object/joint 0").qposadr
+    held, plant = payload.thing.object_file.held, env.engine.simulation.model
+    assert held.qpos0[0] == plant.qpos0[address]
+    assert held.qpos_spring[0] == plant.qpos_spring[address]
+
+
+SPRUNG = ROD.format(more="").replace(
+    '<body name="rod">',
+    '<body name="weight"><joint name="up" type="slide" axis="0 0 1" stiffness="3000" damping="20" '
+    'springref="0.00654"/><geom size="0.05" mass="2" pos="0.3 0 0"/></body><body name="rod">',
+)
+
+
+def test_what_starts_against_its_springs_is_not_taken_for_another_weight(write):
+    env = batch(MjcfPayload(path=write(SPRUNG)), 8)
+    env.reset(seed=0)
+    asked = np.tile([0.2, 0.0, 0.1], (8, 1))
+    for _ in range(25):
+        observation, *_ = env.step(asked)
+    reached = env.engine.layout.part(observation, "grasp_velocity_b")
+    np.testing.assert_allclose(reached, asked * 3.0 * 0.5, atol=0.08)
+
+
+def test_what_turns_with_the_base_is_turned(write):
+    wide = (
+        '<body><geom type="capsule" size="0.02" fromto="0 -1.5 0.1 0 1.5 0.1" mass="8"/></body>'
+        "<site"
+    )
+    payload = MjcfPayload(path=write(ROD.format(more="").replace("<site", wide, 1)))
+    env = batch(payload, 1)
+    env.reset(options={"start": "paper"})
+    for _ in range(25):
+        observation, *_ = env.step(np.array([[0.0, 0.2, 0.0]]))
+    assert payload.yaw_inertia_kgm2 > 5.0
+    left = env.engine.layout.part(observation, "grasp_velocity_b")[0, 1]
+    assert abs(left - 0.3) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (("axis", 'springref="0.3" stiffness="300" axis'), PayloadError, "as it hangs"),
+        (('name="rod"', 'name="rod" gravcomp="0.5"'), ObjectFileError, "gravcomp"),
+    ],
+)
+def test_what_would_never_arrive_or_weighs_less_than_it_is_is_refused(change, error, words, write):
+    with pytest.raises(error, match=words):
+        batch(MjcfPayload(path=write(ROD.format(more="").replace(*change))))
+
+
+def test_parts_that_are_rigidly_one_are_neighbours_of_what_hangs_from_them(write):
+    tray = """<body name="plate"><geom size="0.05" mass="0.1"/></body>
+      <body name="tray"><joint name="slide" type="slide" axis="1 0 0" stiffness="100" damping="1"/>
+      <geom size="0.05" mass="0.1"/></body><body name="rod">"""
+    MjcfPayload(path=write(ROD.format(more="").replace('<body name="rod">', tray)))
+
+
+def test_it_stays_what_was_read_whatever_becomes_of_the_file(write, tmp_path, monkeypatch):
+    path = write(ROD.format(more=""))
+    monkeypatch.chdir(tmp_path)
+    payload = MjcfPayload(path="object.xml")
+    assert payload == MjcfPayload(path=Path(path)) and hash(payload) == hash(MjcfPayload(path=path))
+    write(ROD.format(more="").replace("3.1153", "4.0"))
+    assert payload != MjcfPayload(path=path)
+    Path(path).unlink()
+    monkeypatch.chdir("/")
+    copy = pickle.loads(pickle.dumps(payload))
+    assert copy == payload and copy.mass_kg == pytest.approx(3.1153) and copy.identity
+    batch(copy, 1)
+
+
+@pytest.mark.parametrize("arguments", [{"path": 3}, {"path": ""}, {"path": "x", "grasp_site": 1}])
+def test_paths_and_names_are_texts(arguments):
+    with pytest.raises(ParameterError):
+        MjcfPayload(**arguments)
+
+
+def test_a_specification_with_a_path_object_becomes_json():
+    env = gymnasium.make(
+        "defmanip_gym:DeformTransport-v1",
+        payload={"path": EXAMPLES / "hose.xml"},
+        disable_env_checker=True,
+    )
+    assert "hose.xml" in env.spec.to_json()
+    with pytest.raises(ParameterError, match="beam_ranges"):
+        gymnasium.make("defmanip_gym:DeformTransportRandomized-v1", payload=example("hose"))
+
+
+def test_forces_need_no_loop():
+    env = DeformTransportEnv(payload=example("hose"), control_mode="force")
+    env.reset(seed=0)
+    assert env.step(np.zeros(4))[0].shape == (28,)
+
+
+def test_starts_are_within_sigma_where_the_object_is(write):
+    text = ROD.format(more="").replace("axis", 'springref="0.03" stiffness="100" axis')
+    env = batch(MjcfPayload(path=write(text)), 1)
+    with pytest.raises(StartError, match="swing"):
+        env.reset(options={"start": (-8.5, 5.5, 0.0, np.pi / 3, -np.pi / 2, 0.51)})

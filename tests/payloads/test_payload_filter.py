@@ -84,3 +84,10 @@ def test_rods_get_the_rods_filter():
     config = filtered(1).unwrapped.config
     made = payload_filter_for(config)
     assert isinstance(made, StorageFilter) and made == filter_for(config)
+
+
+def test_a_filter_that_believes_another_mass_does_not_apply(bucket):
+    payload = bucket.unwrapped.config.payload
+    made = ObjectStorageFilter(payload.linkage, mass_kg=2 * payload.mass_kg)
+    _, info = SafetyFilterVectorWrapper(bucket.env, made).reset(seed=0)
+    assert not info["filter_applies"].any()

@@ -126,7 +126,7 @@ class FieldController(SampledLaw):
             observer_gain=params.observer_gain_per_s,
             following_rate=params.following_rate,
             period_s=self.task.control_period_s,
-            inertia_shares=self.payload.inertia_shares,
+            felt_inertia_kg=self.payload.felt_inertia_kg,
         )
 
     def _check_gains(self) -> None:

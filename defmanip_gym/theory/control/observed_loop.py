@@ -84,7 +84,7 @@ class ObservedLoop:
         following_rate: κ of swing following, 1/s.
         period_s: control period T.
         delay_periods: control periods until w takes effect.
-        inertia_shares: m̂ over the mass along each axis, a rod's by default.
+        felt_inertia_kg: diagonal of m̂, a uniform rod's by default.
     """
 
     robot: RobotParams
@@ -97,7 +97,7 @@ class ObservedLoop:
     following_rate: float
     period_s: float
     delay_periods: int = 0
-    inertia_shares: tuple[float, float, float] = (ROD_SHARE, 1.0, 1.0)
+    felt_inertia_kg: tuple[float, float, float] | None = None
 
     def spectral_radius(self) -> float:
         """Return the largest |eigenvalue| over one sample; the loop is stable below 1."""
@@ -128,7 +128,8 @@ class ObservedLoop:
         compliance = np.linalg.inv(M + true.apparent)
         advance, forced = _held(true, -compliance @ true.force(), self.period_s)
         if self.believed is None:
-            weighed = self.carried.m_o11[0, 0] * np.diag(self.inertia_shares)
+            own = self.carried.m_o11[0, 0] * np.array((ROD_SHARE, 1.0, 1.0))
+            weighed = np.diag(own if self.felt_inertia_kg is None else self.felt_inertia_kg)
             feeds, shown, seen = M + weighed, np.zeros((_AXES, 2 * count)), np.eye(_AXES)
         else:
             believed = HangingObject.of(self.believed)

@@ -27,7 +27,7 @@ class SwingFollowing:
         self._levers = linear.m_o12 / linear.m_o11[0, 0]
 
     def motion(self, swing: Array, swing_rate: Array) -> tuple[Array, Array]:
-        """Return κ x_c and κ ẋ_c, (n, 3) m/s and m/s², base frame; exact for rods, else linear.
+        """Return κ x_c and κ ẋ_c, (n, 3) m/s and m/s², base frame: a rod's, else to first order.
 
         The vertical way, (l/2)(1 − cos φ) of a rod, is small of second order and left out.
 

@@ -19,7 +19,7 @@ from defmanip_gym.theory.filters.linkage_storage import LinkageStorageRoom
 from defmanip_gym.theory.filters.safety_filter import BoolArray, FilterProof
 from defmanip_gym.theory.filters.sensed import Sensed
 from defmanip_gym.theory.filters.storage_keeping import StorageKeeping, StorageMemory
-from defmanip_gym.theory.payload.linkage import Linkage, require_linkage
+from defmanip_gym.theory.payload.linkage import HeldLinkage, Linkage, require_linkage
 from defmanip_gym.validation import (
     plain,
     require_between,
@@ -158,7 +158,9 @@ class ObjectStorageFilter(StorageKeeping):
         return within
 
     def covers(self, carried: object) -> bool:
-        """Whether it holds for this object: a ``Linkage`` with the same numbers."""
+        """Whether it holds for this object: a ``Linkage``, or a held one, with the same numbers."""
+        if isinstance(carried, HeldLinkage):
+            return carried.mass_kg == self.mass_kg and self.covers(carried.linkage)
         return isinstance(carried, Linkage) and all(
             np.array_equal(own, other) for own, other in zip(self.linkage, carried, strict=True)
         )

@@ -54,6 +54,13 @@ class Linkage(NamedTuple):
     preload: Array
 
 
+class HeldLinkage(NamedTuple):
+    """Links, and what they weigh with what the gripper holds, kg."""
+
+    linkage: Linkage
+    mass_kg: float
+
+
 def require_linkage(name: str, value: Any) -> Linkage:
     """Return a linkage, or that of a mapping of its fields.
 
