@@ -80,8 +80,8 @@ class DeformTransportEnv(EpisodeAccess, gymnasium.Env[Any, Any]):
     | 16-18 | grasp_force_b    | measured force on the object           | N          |
     | 19-21 | near_offset_b    | tanh of goal_offset_b over 0.5 m       | -          |
 
-    Of a `payload` from a file, swing and swing_rate are its joint positions and rates, rad or m; φ and
-    σ in what follows then stand for these, and `info` has no `beam_` entries.
+    Of a `payload` from a file, swing and swing_rate are its joint positions and rates, rad or m; φ
+    and σ in what follows then stand for these, and `info` has no `beam_` entries.
 
     ## Rewards
     The sum of the terms below, each also in `info`; the first four are differences of potentials.
