@@ -54,7 +54,7 @@ committed:
 agents: $(INSTALLED) committed  ## train and ship all agents, half a day; runs that are there are kept
 	$(BIN)/defmanip trainings
 	$(BIN)/defmanip trainings --env DeformTransportRandomized-v0 --algos ppo
-	$(BIN)/defmanip trainings --env DeformTransport-v1 --algos ppo --filter storage
+	$(BIN)/defmanip trainings --env DeformTransport-v1 --algos ppo sac --filter storage
 	$(BIN)/defmanip trainings --env DeformTransportRandomized-v1 --algos ppo --filter storage
 	$(BIN)/defmanip ship runs/*
 

@@ -19,10 +19,9 @@ _SHOWN_ELSEWHERE = ("normalization", "hyperparameters", "scores", "command")
 
 
 def agents_table(cards: Mapping[str, AgentCard]) -> Table:
-    """Return one row per agent."""
+    """Return one row per agent, whose name begins with its recipe's."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("agent", no_wrap=True)
-    table.add_column("recipe", no_wrap=True)
     table.add_column("steps", justify="right", no_wrap=True)
     table.add_column("trained\ninside")
     table.add_column(f"success (%)\n{_LISTED_SUITE}", justify="right")
@@ -31,7 +30,6 @@ def agents_table(cards: Mapping[str, AgentCard]) -> Table:
         score = card.scores.get(_LISTED_SUITE)
         table.add_row(
             escape(name),
-            card.recipe,
             f"{card.total_timesteps / 1e6:.2f} M",
             card.trained_inside or _NONE,
             _NONE if score is None else _success(score),

@@ -15,7 +15,7 @@ from defmanip_gym.envs.registration import (
 )
 from defmanip_gym.evaluation.seeds import FIRST_EVALUATION_SEED, VALIDATION_SEED
 from defmanip_gym.training.config import ALGORITHM_OF
-from defmanip_gym.training.hyperparameters import HYPERPARAMETERS
+from defmanip_gym.training.hyperparameters import HYPERPARAMETERS, load_hyperparameters
 from defmanip_gym.training.search_spaces import SEARCH_SPACES
 
 ROOT = Path(__file__).parents[2]
@@ -45,7 +45,7 @@ def test_randomized_environment_and_seeds_are_as_told():
 def test_the_study_is_of_the_search_space_as_it_is():
     header, *trials = re.findall(r"^\| (\w+) \| ([\w.]+) \| (.*) \|$", STUDY, re.M)
     trial = optuna.create_study().ask()
-    SEARCH_SPACES["ppo"](trial)
+    SEARCH_SPACES["ppo"](trial, load_hyperparameters(None, "ppo", ENV_ID))
     assert header[:2] == ("trial", "score") and header[2].split(" | ") == sorted(trial.params)
     assert sorted(int(number) for number, *_ in trials) == list(range(len(trials)))
     assert f"defmanip tune --trials {len(trials)} " in STUDY
