@@ -165,4 +165,5 @@ def test_make_agents_trains_and_ships_every_recipe_with_five_seeds():
     expected = {(recipe, ENV_ID, seed) for recipe in get_args(Recipe) for seed in range(5)}
     for env_id in (RANDOMIZED_ENV_ID, QUICK_ENV_ID, ROBUST_ENV_ID):
         expected |= {("ppo", env_id, seed) for seed in range(5)}
+    expected |= {("sac", QUICK_ENV_ID, seed) for seed in range(5)}
     assert set(runs) == expected and len(runs) == len(expected)
