@@ -33,7 +33,8 @@ def payload_of(
         ParameterError: a payload beside a beam, or something that is none.
     """
     if payload is None:
-        return RodPayload(beam=beam, beam_ranges=beam_ranges, nominal_beam=nominal_beam)  # type: ignore[arg-type]
+        rod = {"beam": beam, "beam_ranges": beam_ranges, "nominal_beam": nominal_beam}
+        return require_params("payload", rod, RodPayload)
     for name, value, default in (
         ("beam", beam, BeamParams()),
         ("beam_ranges", beam_ranges, BeamRanges()),

@@ -81,7 +81,8 @@ class MjcfPayload(Payload):
     def coordinates(self) -> tuple[Coordinate, ...]:
         """The file's joints in their order."""
         held, rest = self.thing.object_file.held, self.thing.linear.equilibrium
-        units = ["m" if kind == 2 else "rad" for kind in held.jnt_type]
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        units = ["m" if kind == slide else "rad" for kind in held.jnt_type]
         return tuple(
             Coordinate(name=name, unit=unit, rest=float(at))
             for name, unit, at in zip(self.linear.coordinates, units, rest, strict=True)
@@ -94,7 +95,7 @@ class MjcfPayload(Payload):
 
     @property
     def known(self) -> dict[str, Any]:
-        """The same."""
+        """What ``identity`` tells: a controller knows the file's object."""
         return self.identity
 
     @property
@@ -118,7 +119,7 @@ class MjcfPayload(Payload):
 
     @cached_property
     def linkage(self) -> Linkage:
-        """The same."""
+        """The object as links, of which filters are made; ObjectFileError as in ``carried``."""
         return self.thing.linkage()
 
     @property
